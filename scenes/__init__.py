@@ -37,6 +37,11 @@ __all__ = [
 ]
 
 
+def is_file(name: str) -> bool:
+    """Whether a name of a scene is the path of its file."""
+    return name.endswith((".toml", ".xml"))
+
+
 def __getattr__(name: str) -> Any:
     """A public name, from the module that has it."""
     if name not in _WHERE:

@@ -26,7 +26,7 @@ Rect = tuple[float, float, float, float]
 
 MARGIN_M = 0.03  # m between hulls, and between a hull and a box
 CELL_M = 0.1  # m between the nodes on which floor is looked for
-LARGE_M2 = 1e5  # m2 of floor times goals from which on ways are found on coarser nodes
+LARGE_M2 = 2e4  # m2 of floor times goals from which on ways are found on coarser nodes
 AT_WALL_M = 0.35  # m from a hull to the furniture or wall that it stands at, at most
 ROW_M = 0.08  # m between two hulls in a row
 DOORWAY_M, GOAL_M, START_M = 0.65, 0.45, 0.7  # m kept clear, as in ``scenes.recipe``
@@ -283,9 +283,10 @@ def _ways(bounds: Rect, walls: bytes, goals: bytes) -> Float:
     _, before = dijkstra(graph, directed=False, indices=first, return_predecessors=True)
     used: set[int] = set()
     for k in range(len(first)):
-        for end in at[k + 1 :].tolist():
-            node = end
-            while node >= 0:
-                used.add(node)
-                node = int(before[k, node])
+        back, own = before[k].tolist(), set[int]()
+        for node in at[k + 1 :].tolist():
+            while node >= 0 and node not in own:  # from there on the way back is known
+                own.add(node)
+                node = back[node]
+        used |= own
     return np.ascontiguousarray(nodes[sorted(used)])

@@ -21,6 +21,7 @@ from scenes.recipe import (
     hang_doors,
     park,
     put_bins,
+    put_movers,
     scatter,
     seat_chairs,
 )
@@ -55,6 +56,7 @@ def filled(  # noqa: PLR0913 (the counts of a scene, each by name)
     builder, draws = Builder(walls), Draws(seed)
     hang_doors(builder, draws.doors, doors)
     put_bins(builder, draws.bins)
+    put_movers(builder, walls.put)
     floor = free_floor(builder)
     seat_chairs(builder, floor, walls.seats, n_chairs, draws)
     for kind, n in (loads or {}).items():

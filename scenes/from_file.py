@@ -31,6 +31,7 @@ from scenes.recipe import (
     free_floor,
     hang_doors,
     put_bins,
+    put_movers,
     scatter,
     seat_chairs,
 )
@@ -86,13 +87,9 @@ def _scene(file: SceneFile, wanted: Wanted, seed: int) -> Scene:
     builder, draws = Builder(plan), Draws(seed)
     hang_doors(builder, draws.doors, "open" if wanted.doors == "none" else wanted.doors)
     put_bins(builder, draws.bins)
-    for kind, pose in movers:
-        name = "chair" if KINDS[kind].group == "chair" else kind
-        n = sum(m.name.rstrip("0123456789") == name for m in builder.movers)
-        builder.add(kind, f"{name}{n}", pose)
+    put_movers(builder, movers)
     floor = free_floor(builder)
-    own = sum(m.group == "chair" for m in builder.movers)
-    seat_chairs(builder, floor, plan.seats, own + wanted.n_chairs, draws)
+    seat_chairs(builder, floor, plan.seats, wanted.n_chairs, draws)
     scatter(builder, floor, "person", wanted.n_people, draws, draws.people)
     options = {key: getattr(wanted, key) for key in Wanted.__dataclass_fields__}
     return finish(builder, file.path.stem, seed, options)
@@ -120,7 +117,8 @@ def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> tuple[Pl
 
 def _movers(file: SceneFile, wanted: Wanted, plan: Plan) -> tuple[Movers, list[Box]]:
     """What moves, and the boxes of things that do not: kept, off the floor, or without room."""
-    movers, boxes = [(kind, pose) for kind, pose in file.put if kind in KINDS], plan.boxes
+    own = [(kind, pose) for kind, pose in file.put if kind in KINDS]
+    movers, boxes = [*plan.put, *own], plan.boxes
     standing: list[Box] = []
     for thing in file.things if wanted.furniture != "drop" else ():
         on_floor = any(

@@ -13,6 +13,7 @@ from typing import Literal, get_args
 from slam.errors import InvalidValueError, UnknownNameError
 
 Group = Literal["chair", "bin", "load", "person", "door", "robot"]
+PUSHED = ("chair", "bin", "load")  # groups that a plan or a file may put
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -30,6 +30,7 @@ WRITTEN = {
     "lift": "lift:ROOM:left|right",
     "opening": "opening:NAME",
     "seat": "seat:KIND:N",
+    "put": "put:KIND",
     "spot": "spot:KIND:N",
     "bin": "bin:ROOM:N",
     "bounds": "bounds:NAME",

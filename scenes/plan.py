@@ -7,9 +7,11 @@ move are added to copies of it (``scenes.builder``).
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
 from functools import cache
+from itertools import product
 from pathlib import Path
 
 import mujoco
@@ -17,13 +19,69 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes import look
-from scenes.assembly import Assembly, moved, part_marks, quaternion
-from scenes.kinds import KINDS
+from scenes.assembly import (
+    Assembly,
+    check_materials,
+    file_of,
+    moved,
+    ours,
+    parsed,
+    part_marks,
+    quaternion,
+)
+from scenes.kinds import KINDS, PUSHED
 from scenes.marks import Mark, check_marks, check_written, marks, yaw_of
-from scenes.mjcf import check_materials, ours, parsed
 from scenes.scene import Pose
-from scenes.views import add_cameras
 from slam.errors import InvalidValueError
+
+Bounds = tuple[float, float, float, float]
+
+ASPECT = 16 / 9
+HEIGHT = 1.1  # m, of what is to be in the picture
+RIM_M = 0.35  # m of ground shown around the floor, outer walls included
+PITCH_DEG, FOV_DEG = 56.0, 36.0
+MARGIN = 1.01
+ROUNDS = 40  # of moving the camera; each halves the error at least
+
+
+def add_cameras(spec: mujoco.MjSpec, bounds: Bounds) -> None:
+    """Add "top" and "persp" if they are missing, so that a 16:9 picture shows all of ``bounds``."""
+    known = {camera.name for camera in spec.cameras}
+    xmin, ymin, xmax, ymax = bounds
+    if "top" not in known:
+        wide, high = xmax - xmin + 2 * RIM_M, ymax - ymin + 2 * RIM_M
+        camera = spec.worldbody.add_camera(
+            name="top", pos=[0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 14.0]
+        )
+        camera.proj = mujoco.mjtProjection.mjPROJ_ORTHOGRAPHIC
+        camera.fovy = max(high, wide / ASPECT)
+    if "persp" not in known:
+        pitch = math.radians(PITCH_DEG)
+        camera = spec.worldbody.add_camera(name="persp", pos=_stand_back(bounds), fovy=FOV_DEG)
+        half = 0.5 * (0.5 * math.pi - pitch)  # the camera looks along its -z: level is a quarter up
+        camera.quat = [math.cos(half), math.sin(half), 0.0, 0.0]
+
+
+def _stand_back(bounds: Bounds) -> list[float]:
+    """Where a camera that looks north and down by the pitch sees all corners, none closer."""
+    xmin, ymin, xmax, ymax = bounds
+    xmin, ymin, xmax, ymax = xmin - RIM_M, ymin - RIM_M, xmax + RIM_M, ymax + RIM_M
+    corners = list(product((xmin, xmax), (ymin, ymax), (0.0, HEIGHT)))
+    cos, sin = math.cos(math.radians(PITCH_DEG)), math.sin(math.radians(PITCH_DEG))
+    reach = math.tan(math.radians(0.5 * FOV_DEG)) / MARGIN
+    x, y = 0.5 * (xmin + xmax), 0.5 * (ymin + ymax)  # what it looks at on the floor
+    distance = xmax - xmin + ymax - ymin
+    for _ in range(ROUNDS):
+        seen = []
+        for cx, cy, cz in corners:
+            depth = distance + (cy - y) * cos - cz * sin
+            seen.append(((cx - x) / depth, ((cy - y) * sin + cz * cos) / depth))
+        low, high = min(v for _, v in seen), max(v for _, v in seen)
+        width = max(abs(u) for u, _ in seen)
+        y += 0.5 * (low + high) * distance / sin
+        distance *= 0.5 + 0.5 * max(width / (reach * ASPECT), 0.5 * (high - low) / reach)
+    return [x, y - distance * cos, distance * sin]
+
 
 JAMB_OFFSET = 0.04  # m from the plane of a hinge to the middle of its wall, away from the swing
 WALL_HEIGHT = 1.1  # m, walls are cut there
@@ -43,10 +101,12 @@ class Plan:
     def __init__(self, source: str, *, floors: Sequence[str] = ()) -> None:
         """``source``: name of one of our plans or path of an MJCF file; ``floors``: materials that
         will be used beside those of the file."""
-        spec, self.marks = _parsed(source, tuple(floors))
+        written = file_of("plans", source).stat().st_mtime_ns
+        spec, self.marks = _parsed(source, tuple(floors), written)
         self.spec = spec.copy()
         self._source = Path(source).name
         self.seats: list[Mark] = list(self.find("seat"))
+        self.put: list[tuple[str, Pose]] = []
         self._furniture: list[list[float]] = []
         self._boxes: NDArray[np.float64] | None = None
         self._counts: Counter[str] = Counter()
@@ -119,11 +179,26 @@ class Plan:
         )
 
     def furnish_marks(self, parts: Sequence[str]) -> None:
-        """Put each of these parts wherever a mark starts with its name."""
-        for part in parts:
-            self._kinds.add(Path(part).stem)
-            for mark in self.find(Path(part).stem):
+        """Put each of these parts wherever a mark starts with its name, or says ``put`` and it.
+
+        What can move, and is put so, becomes part of ``put``: a kind and its pose.
+        """
+        stands = {Path(part).stem: part for part in parts}
+        self._kinds |= set(stands)
+        for kind, part in stands.items():
+            for mark in self.find(kind):
                 self.furnish(part, mark.pose)
+        moves = [kind for kind, row in KINDS.items() if row.group in PUSHED]
+        for mark in self.find("put"):
+            if mark.words[1] in stands:
+                self.furnish(stands[mark.words[1]], mark.pose)
+            elif mark.words[1] in moves:
+                self.put.append((mark.words[1], mark.pose))
+            else:
+                raise InvalidValueError(
+                    f"plan '{self._source}': mark '{':'.join(mark.words)}' has the unknown kind "
+                    f"'{mark.words[1]}'. There are: {', '.join(sorted((*stands, *moves)))}"
+                )
 
     def frame_doors(self) -> None:
         """Jambs and threshold at each ``door:ROOM:left|right`` mark."""
@@ -205,7 +280,9 @@ def furniture() -> tuple[str, ...]:
 
 
 @cache
-def _parsed(source: str, floors: tuple[str, ...]) -> tuple[mujoco.MjSpec, tuple[Mark, ...]]:
+def _parsed(
+    source: str, floors: tuple[str, ...], _written: int
+) -> tuple[mujoco.MjSpec, tuple[Mark, ...]]:
     """The file without its marks, floors painted, all clothes in the wardrobe; copy before use."""
     spec = parsed("plans", source)
     found = marks(spec)

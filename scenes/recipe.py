@@ -11,6 +11,7 @@ import numpy as np
 from scenes import look
 from scenes.assembly import reach_of
 from scenes.builder import Builder
+from scenes.kinds import KINDS
 from scenes.marks import Mark
 from scenes.placement import Floor
 from scenes.plan import Plan
@@ -111,10 +112,12 @@ def hang_sliding_doors(builder: Builder) -> None:
 
 
 def seat_chairs(
-    builder: Builder, floor: Floor, seats: Sequence[Mark], n: int, draws: Draws
+    builder: Builder, floor: Floor, seats: Sequence[Mark], more: int, draws: Draws
 ) -> None:
-    """``n`` chairs: a seeded choice of seats, pulled out a little and turned; the rest anywhere."""
-    order = draws.chairs.permutation(len(seats))[:n]
+    """So many more chairs: a seeded choice of seats, pulled out a little and turned; the rest
+    anywhere."""
+    n = more + sum(m.group == "chair" for m in builder.movers)
+    order = draws.chairs.permutation(len(seats))[:more]
     for index in sorted(order.tolist()):
         kind: Kind = "chair_visitor" if seats[index].words[1] == "chair_visitor" else "chair_swivel"
         pose = _askew(floor, seats[index].pose, reach_of(kind) + MARGIN, draws.chairs, PULLED)
@@ -170,6 +173,14 @@ def put_bins(builder: Builder, rng: np.random.Generator) -> None:
         shift = rng.uniform(-MARGIN, MARGIN, 2).tolist()
         yaw = float(rng.uniform(-3.0, 3.0))
         builder.add("bin", f"bin{index}", (mark.pose[0] + shift[0], mark.pose[1] + shift[1], yaw))
+
+
+def put_movers(builder: Builder, movers: Sequence[tuple[str, Pose]]) -> None:
+    """Things that can move, by kind and pose; chairs of all kinds are "chair0", "chair1", ..."""
+    for kind, pose in movers:
+        name = "chair" if KINDS[kind].group == "chair" else kind
+        n = sum(m.name.rstrip("0123456789") == name for m in builder.movers)
+        builder.add(kind, f"{name}{n}", pose)
 
 
 def finish(builder: Builder, name: str, seed: int, options: Mapping[str, object]) -> Scene:

@@ -10,7 +10,7 @@ from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
-from scenes import SCAN_HEIGHT
+from scenes import SCAN_HEIGHT, is_file
 from slam.bounded import check_file
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.names import first_line, join_folders, refuse_code
@@ -104,11 +104,6 @@ def find(name: str) -> Recipe:
         return recipe(name)
     refuse_code(name, "scene")
     return _load(name) if ":" in name else _find(name)
-
-
-def is_file(name: str) -> bool:
-    """Whether a name of a scene is the path of its file."""
-    return name.endswith((".toml", ".xml"))
 
 
 def check_name(name: str) -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import hashlib
 import math
 import tomllib
 from collections.abc import Iterator
@@ -10,24 +11,24 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from scenes.kinds import KINDS
+from scenes import is_file
+from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
 from scenes.recipe import DOORS, choice, count, switch
 from scenes.scene import Pose
-from slam.bounded import text_of
+from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError
 
 Box = tuple[float, float, float, float, float]
 Point = tuple[float, float]
 
-MAX_BYTES = 1 << 22
+MAX_BYTES, MAX_PLAN_BYTES = 1 << 22, 1 << 26
 MAX_ROWS = 5000  # walls, things, doors or pieces of furniture
 FURNITURE = ("move", "keep", "drop")
 LISTS = ("walls", "rooms", "goals", "put", "things", "hinges")
 OPTIONS = ("furniture", "doors", "seats", "n_chairs", "n_people")
 MORE = ("event", "robot")  # read by others (``sim``)
 KEYS = ("plan", "wall_m", "start", *LISTS, *OPTIONS, *MORE)
-PUSHED = ("chair", "bin", "load")  # groups of movers that a file may put
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -104,6 +105,30 @@ def read(path: Path) -> SceneFile:
     if path.suffix == ".xml":
         return SceneFile(path=path, plan=path)
     return _Reading(path, tables(path)).made()
+
+
+def files(path: Path) -> tuple[Path, ...]:
+    """A scene's file, and those beside it that it names: its plan and its robot."""
+    own = tables(path) if path.suffix == ".toml" else {}
+    named = [name for name in (own.get("plan"), own.get("robot")) if isinstance(name, str)]
+    return path, *(path.parent / name for name in named if is_file(name))
+
+
+def sha256_of(scene: str) -> str | None:
+    """Of all ``files`` of a scene by its file; None for another."""
+    if not is_file(scene):
+        return None
+    each = [hashlib.sha256(bytes_of(f, MAX_PLAN_BYTES)).digest() for f in files(Path(scene))]
+    return hashlib.sha256(b"".join(each)).hexdigest()
+
+
+def changed(scene: str, sha256: str | None) -> str:
+    """What says that a scene's files are others than those with that hash; "" where they are not,
+    or where no hash is known."""
+    now = sha256_of(scene) if sha256 is not None else None
+    if now == sha256:
+        return ""
+    return f"is not what was recorded, it or its plan or robot: SHA-256 then {sha256}, now {now}"
 
 
 class _Reading:

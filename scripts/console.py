@@ -28,8 +28,8 @@ from rich.text import Text
 from slam.errors import printable
 
 LINE_EVERY_S = 10.0  # between lines of progress where the output is no terminal
-console = Console()
-_errors = Console(stderr=True)
+console = Console(emoji=False)  # "seat:chair:0" is a mark, and no picture of a chair
+_errors = Console(stderr=True, emoji=False)
 
 
 def plain(words: str) -> str:

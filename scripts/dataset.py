@@ -6,12 +6,11 @@ from __future__ import annotations
 import time
 from collections.abc import Callable
 from functools import partial
-from itertools import product
+from itertools import count, product
 from pathlib import Path
 from typing import Any
 
 from rich.markup import escape
-from rich.progress import Progress
 from rich.table import Table
 
 from scripts import interrupt, workers
@@ -37,21 +36,29 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1, cluster: str | None = Non
 
 
 def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | None) -> None:
-    """Every missing episode, with a bar: episodes, simulated seconds a second, time left."""
+    """Every missing episode, with a bar that counts simulated seconds."""
     total, length_s = len(dataset.plan.jobs()), dataset.plan.recipe.seconds
-    alone = cluster is None and (jobs == 1 or len(missing) < 2)
+    rate = rate_hz(dataset.plan.recipe.scanner)
     with progress() as bar:
-        meter = _Meter(
-            bar,
-            total=total,
-            done=total - len(missing),
-            length_s=length_s,
-            rate_hz=rate_hz(dataset.plan.recipe.scanner),
+        before = int((total - len(missing)) * length_s)
+        task = bar.add_task(
+            "generating", total=total * length_s, completed=before, before=before, unit=""
         )
-        note_frame = meter.frame if alone else None
-        call = partial(_one, dataset.path, note_frame)
-        for spent in workers.each(call, missing, jobs=jobs, cluster=cluster, shared=dataset.path):
-            meter.episode()
+        scans = count(1)
+
+        def frame() -> None:
+            """One more scan of an episode that is being made in this process."""
+            interrupt.check()
+            if next(scans) % 25 == 0:
+                bar.advance(task, 25.0 / rate)
+
+        alone = cluster is None and (jobs == 1 or len(missing) < 2)
+        call = partial(_one, dataset.path, frame if alone else None)
+        ways: dict[str, Any] = {"jobs": jobs, "cluster": cluster, "shared": dataset.path}
+        for done, spent in enumerate(workers.each(call, missing, **ways), 1):
+            interrupt.check()
+            unit = f"{total - len(missing) + done}/{total} episodes"
+            bar.update(task, completed=before + done * length_s, unit=unit)
             if cluster is None:
                 learn([spent])
 
@@ -61,42 +68,6 @@ def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) ->
     started = time.perf_counter()
     record(recipe, folder, note=note_frame or (lambda: None))
     return Work(f"generate {recipe.scene}", recipe.seconds), time.perf_counter() - started
-
-
-class _Meter:
-    """The progress bar; counts in simulated seconds."""
-
-    def __init__(
-        self, bar: Progress, *, total: int, done: int, length_s: float, rate_hz: float
-    ) -> None:
-        self._bar, self._total, self._done, self._length_s = bar, total, done, length_s
-        self._frames, self._before, self._started = 0, done, time.perf_counter()
-        self._rate_hz = rate_hz
-        self._task = bar.add_task(
-            "generating",
-            unit="",
-            total=total * length_s,
-            completed=int(done * length_s),
-            before=int(done * length_s),
-        )
-
-    def frame(self) -> None:
-        """One more scan of the episode that is being made here."""
-        self._frames += 1
-        if self._frames % 25 == 0:
-            self._show(min(self._frames / self._rate_hz, self._length_s))
-
-    def episode(self) -> None:
-        """One more episode."""
-        self._done, self._frames = self._done + 1, 0
-        self._show(0.0)
-
-    def _show(self, begun_s: float) -> None:
-        interrupt.check()
-        seconds = (self._done - self._before) * self._length_s + begun_s
-        rate = seconds / max(time.perf_counter() - self._started, 1e-3)
-        unit = f"{self._done}/{self._total} episodes, {rate:.1f} s simulated per s"
-        self._bar.update(self._task, completed=self._before * self._length_s + seconds, unit=unit)
 
 
 def summary(dataset: Dataset, made: int, spent_s: float) -> Table:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Still figures of a finished run: trajectories, errors, and the map in the paper's style."""
+"""Still figures: trajectories, errors and map of a run; what all curves against a level share."""
 
 from __future__ import annotations
 
@@ -14,6 +14,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.backends.backend_agg import FigureCanvasAgg
 from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from matplotlib.ticker import FuncFormatter, LogLocator, NullFormatter
 from numpy.typing import NDArray
 from scipy.ndimage import center_of_mass, maximum_filter
@@ -34,6 +35,9 @@ _TICKS = (  # up to which ratio of the ends which multiples of a power of ten ar
     (1000.0, (1.0, 2.0, 5.0)),
     (math.inf, (1.0,)),
 )
+_MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+Point = tuple[float, float, float, float]
+"""x, value, and the ends of its interval; NaN for what is not there."""
 Margins = tuple[float, float, float, float]
 LINEAR_DEG = 1.0  # degrees about 0 where the axis of the heading error is linear
 _LOOK: dict[str, Any] = {
@@ -60,6 +64,43 @@ def styled(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
     """
     with mpl.rc_context({**_LOOK, **(changes or {})}):
         yield
+
+
+def marker(slam: str, slams: Sequence[str]) -> str:
+    """One marker per SLAM, for those who print in black or see colours otherwise."""
+    return _MARKERS[list(slams).index(slam) % len(_MARKERS)]
+
+
+def apart(slam: str, slams: Sequence[str], levels: Sequence[float]) -> float:
+    """How far beside a level a SLAM is drawn, so that intervals do not hide each other."""
+    span = max(levels) - min(levels) or 1.0
+    gap = 0.02 * span * min(1.0, 4.0 / max(len(levels) - 1, 1), 6.0 / len(slams))
+    return gap * (list(slams).index(slam) - 0.5 * (len(slams) - 1))
+
+
+def line(ax: Axes, points: Sequence[Point], color: str, mark: str, label: str = "") -> None:
+    """Values with their intervals; a cross at the top stands for an infinite one."""
+    shown = [(x, value) for x, value, _, _ in points if math.isfinite(value)]
+    ax.plot([x for x, _ in shown], [y for _, y in shown], color=color, marker=mark, ms=5.0, lw=1.6,
+            mec="white", mew=0.6, zorder=3, label=label)  # fmt: skip
+    for x, value, low, high in points:
+        if math.isfinite(low) and high == math.inf:  # past the axes, which do not grow for it
+            bar = Line2D([x, x], [low, 1e12], color=color, lw=3.2, alpha=0.3, zorder=2)
+            bar.set_clip_path(ax.patch)
+            ax.add_artist(bar)
+        elif math.isfinite(low) and math.isfinite(high):
+            ax.plot([x, x], [low, high], color=color, lw=3.2, alpha=0.3, solid_capstyle="round",
+                    zorder=2)  # fmt: skip
+        if value == math.inf:
+            ax.plot([x], [0.99], marker="x", ms=7, mew=1.8, color=color, clip_on=False,
+                    transform=ax.get_xaxis_transform())  # fmt: skip
+
+
+def level_axis(ax: Axes, levels: Sequence[float], axis: str = "dynamism") -> None:
+    """What the levels are of, a tick for each level."""
+    ax.set_xlabel(axis)
+    ax.set_xticks(levels)
+    ax.set_xticklabels([f"{level:g}" for level in levels])
 
 
 def save(figure: Figure, path: Path) -> None:

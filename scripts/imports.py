@@ -16,14 +16,15 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any
 
+from scenes import is_file
 from slam.names import join_folders, loaded
 from slam.variants import COMMANDS, inside
 
 INSTALLED = ("site-packages", "dist-packages")
 
 
-def with_imports(file: Path, module: str) -> tuple[Path, ...]:
-    """``file`` and what it imports, directly or not, sorted.
+def with_imports(file: Path, module: str, package: str = "") -> tuple[Path, ...]:
+    """``file`` and what it imports, directly or not, sorted; only of ``package`` if one is given.
 
     ``module`` is its dotted name: it tells the folder that holds the module, or the whole package.
     What lies there counts; of what is installed only the package itself. Names made up at run time
@@ -40,7 +41,8 @@ def with_imports(file: Path, module: str) -> tuple[Path, ...]:
             continue
         found.add(path)
         for imported in _imported(path, name):
-            if root.name not in INSTALLED or imported.partition(".")[0] == top:
+            first = imported.partition(".")[0]
+            if first == (package or first) and (root.name not in INSTALLED or first == top):
                 waiting += _files(root, imported)
     return tuple(sorted(found))
 
@@ -92,7 +94,8 @@ def sources(*packages: Any) -> tuple[Path, ...]:
 def scripts_of(file: str, module: str) -> tuple[Path, ...]:
     """A script and those that it imports, for ``Job.code`` beside the packages that it calls."""
     folder = Path(__file__).resolve().parent
-    return tuple(path for path in with_imports(Path(file), module) if folder in path.parents)
+    found = with_imports(Path(file), module, package=folder.name)
+    return tuple(path for path in found if folder in path.parents)
 
 
 def source_of(slam: str) -> tuple[Path, ...]:
@@ -110,7 +113,11 @@ def source_of(slam: str) -> tuple[Path, ...]:
 
 def source_of_scene(scene: str) -> tuple[Path, ...]:
     """The files of a scene's own module as ``source_of`` has them, and the plans and parts (MJCF)
-    in their folders."""
+    in their folders; or all files of a scene by its file."""
+    if is_file(scene):
+        from scenes.scene_file import files
+
+        return files(Path(scene))
     module, colon, _ = scene.partition(":")
     python = _of_module(module) if colon else ()
     return (*python, *sorted({xml for file in python for xml in file.parent.glob("*.xml")}))

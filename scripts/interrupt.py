@@ -6,6 +6,7 @@ from __future__ import annotations
 import signal
 from types import FrameType
 
+_RETRY_S = 0.05  # s, until a signal that came while LLVM was at work is raised
 _asked = False
 
 
@@ -13,24 +14,40 @@ class InterruptedBySignal(BaseException):
     """Not KeyboardInterrupt, which the command line library swallows without a word."""
 
 
-def _interrupt(_signal: int, _frame: FrameType | None) -> None:
+def _interrupt(number: int, frame: FrameType | None) -> None:
     global _asked
+    again = _asked and number != signal.SIGALRM
     _asked = True
+    if _within_llvm(frame) and not again:
+        signal.setitimer(signal.ITIMER_REAL, _RETRY_S)
+        return
     raise InterruptedBySignal
+
+
+def _within_llvm(frame: FrameType | None) -> bool:
+    """Whether LLVM is at work: an exception in one of its callbacks is lost, or what it has half
+    done ends the process with a segmentation fault."""
+    while frame is not None:
+        if str(frame.f_globals.get("__name__")).startswith("llvmlite.binding"):
+            return True
+        frame = frame.f_back
+    return False
 
 
 def install() -> None:
     """From now on SIGINT, SIGTERM and SIGHUP raise ``InterruptedBySignal`` in the main thread.
 
-    SIGHUP, the end of the terminal, stays ignored where nohup has it so.
+    While LLVM is at work they wait for it; a second signal does not. SIGHUP, the end of the
+    terminal, stays ignored where nohup has it so.
     """
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
+    signal.signal(signal.SIGALRM, _interrupt)
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         signal.signal(signal.SIGHUP, _interrupt)
 
 
 def check() -> None:
-    """Raise it again: an exception that hits a callback of the compiler or a finaliser is lost."""
+    """Raise it again: an exception that hits a finaliser is lost."""
     if _asked:
         raise InterruptedBySignal

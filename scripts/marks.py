@@ -19,15 +19,9 @@ from pathlib import Path
 from slam.errors import InvalidValueError
 from slam.files import write_text
 
-_BEGIN = re.compile(r"<!-- ([\w.-]+) -->")
 MOST_CELLS = 40  # of a table on a page
 _TABLE = re.compile(r"(?:^\|.*\|\n?){3,}", re.MULTILINE)
 SUM = "all"  # how those rows of a long table begin that stay on the page
-
-
-def names(text: str) -> list[str]:
-    """Of the marked places, in order."""
-    return _BEGIN.findall(text)
 
 
 def filled(text: str, name: str, told: str, page: object) -> str:
@@ -85,14 +79,6 @@ def with_tables_apart(
         return "\n".join([*lines[:2], *kept, "", said]) if kept else said
 
     return _TABLE.sub(apart, told)
-
-
-def without(text: str) -> str:
-    """``text`` with nothing at its marked places."""
-    for name in names(text):
-        start, end = _marks(text, name, "the page")
-        text = text[:start] + text[end + len(f"<!-- /{name} -->") :]
-    return text
 
 
 def _marks(text: str, name: str, page: object) -> tuple[int, int]:

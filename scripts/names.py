@@ -6,7 +6,7 @@ from __future__ import annotations
 from collections.abc import Sequence
 from pathlib import Path
 
-from scenes import registry
+from scenes import is_file, registry
 from scripts.console import note
 from slam import system
 from slam.variants import inside
@@ -53,9 +53,9 @@ def run_name(path: Path) -> str:
 
 def scene_name(scene: str) -> str:
     """A scene's name as part of the name of one output: of a file, the name without its folder."""
-    return Path(scene).stem if registry.is_file(scene) else file_name(scene)
+    return Path(scene).stem if is_file(scene) else file_name(scene)
 
 
 def file_name(name: str) -> str:
     """A system's name as part of a file name: ``my_pkg:MySlam`` becomes ``my_pkg-MySlam``."""
-    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name).lstrip("-")
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name).lstrip("-.")

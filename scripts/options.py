@@ -14,13 +14,16 @@ from typing import Annotated, Any
 
 import typer
 
+from scenes import is_file
 from scripts.console import note
 from slam.errors import InvalidValueError
 from slam.names import NameFromFile, is_code, refuse_code
 from slam.set_numbers import with_set
 from slam.variants import COMMANDS, ORACLE, oracle_named
 
-AXES = ("dynamism", "motion", "change")
+PEOPLE = "people"  # the axis of how many walk with the robot
+AXES = ("dynamism", "motion", "change", PEOPLE)
+MOST_PEOPLE, PEOPLE_MOTION = 80, 0.5  # and the motion at which they do, where none is held
 MAX_SWEEP = 1000
 LMS221_HZ = 37.5  # the rate for which the usual numbers of scans are chosen
 BETWEEN = re.compile(r",(?![^{]*\}|[^(]*\))")  # a comma outside braces and brackets
@@ -59,7 +62,8 @@ RobotOption = Annotated[
     str | None,
     typer.Option(
         "--robot",
-        help="Another robot than the scene's: turtlebot3, pioneer3dx, f1tenth, or a TOML file.",
+        help="Another robot than the scene's: f1tenth, hunter2, pioneer3dx, rosbot_xl, "
+        "turtlebot3, or a TOML file.",
     ),
 ]
 MotionLevels = Annotated[
@@ -67,6 +71,10 @@ MotionLevels = Annotated[
 ]
 ChangeLevels = Annotated[
     list[str] | None, typer.Option("--change", help="Levels of change alone, or one to hold.")
+]
+PeopleLevels = Annotated[
+    list[str] | None,
+    typer.Option("--people", help="Levels of how many people walk with the robot, as 0:16:4."),
 ]
 Seed = Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")]
 ScanHeight = Annotated[
@@ -162,6 +170,10 @@ class Held:
     def world(self, scene: str | None, dynamism: float, seed: int) -> dict[str, Any]:
         """The settings of a room, as ``Simulation`` takes them; what is None is not among them."""
         given = {name: value for name, value in asdict(self).items() if value is not None}
+        if scene is not None and is_file(scene):
+            from scenes.scene_file import sha256_of
+
+            given["scene_sha256"] = sha256_of(scene)
         return {"scene": scene, "dynamism": dynamism, **given, "seed": seed}
 
 
@@ -183,7 +195,8 @@ def staged(events: Path | None, robot: str | None) -> dict[str, Any]:
 class Axis:
     """What the levels of a comparison or a drive are of, and what is held.
 
-    name  one of ``AXES``; with "motion" the other, change, is at 0 unless held, and so round
+    name  one of ``AXES``; with "motion" the other, change, is at 0 unless held, and so round;
+          with ``PEOPLE`` the levels are numbers of people, and nobody else is there
     """
 
     name: str = "dynamism"
@@ -194,44 +207,33 @@ class Axis:
             raise InvalidValueError(f"axis must be one of {', '.join(AXES)}, got {self.name!r:.80}")
         if getattr(self.held, self.name, None) is not None:
             raise InvalidValueError(f"--{self.name} cannot be held: the levels are of it")
+        if self.name == PEOPLE and self.held.crowd is not None:
+            raise InvalidValueError("--crowd cannot be held: the levels are of people")
 
     def at(self, level: float) -> dict[str, Any]:
         """``dynamism``, ``motion`` and ``change`` at a level, as ``Simulation`` takes them."""
         held = {"motion": self.held.motion, "change": self.held.change}
         if self.name == "dynamism":
             return {"dynamism": level, **held}
+        if self.name == PEOPLE:
+            motion = PEOPLE_MOTION if self.held.motion is None else self.held.motion
+            return {"dynamism": 0.0, **held, "motion": motion}
         return {"dynamism": 0.0, **held, self.name: level}
 
-
-def chosen(
-    dynamism: Sequence[float], motion: Sequence[float], change: Sequence[float]
-) -> tuple[str, tuple[float, ...], dict[str, float]]:
-    """The axis, its levels, and what is held, from what was given of each; () for nothing.
-
-    The axis is the one with several levels, else dynamism, motion or change, the first given.
-    """
-    given = {"dynamism": dynamism, "motion": motion, "change": change}
-    several = [name for name, levels in given.items() if len(levels) > 1]
-    if len(several) > 1:
-        raise InvalidValueError(f"several levels of one axis only, got --{' and --'.join(several)}")
-    name = (several or [axis for axis in AXES if given[axis]] or ["dynamism"])[0]
-    if name != "dynamism" and dynamism:
-        raise InvalidValueError(
-            f"--dynamism sets both axes: with levels of --{name} give the other axis instead"
-        )
-    held = {axis: given[axis][0] for axis in ("motion", "change") if axis != name and given[axis]}
-    return name, tuple(given[name]), held
+    def crowd(self, level: float) -> str | None:
+        """Who is there at a level, as ``Held.crowd``."""
+        return f"escorts:{level:g}" if self.name == PEOPLE else self.held.crowd
 
 
-def sweep(text: str, option: str = "--dynamism-sweep") -> tuple[float, ...]:
+def sweep(text: str, option: str = "--dynamism-sweep", most: float = 1.0) -> tuple[float, ...]:
     """``0:1:0.25`` -> (0, 0.25, 0.5, 0.75, 1); ``InvalidValueError`` for anything else."""
     try:
         start, stop, step = (float(word) for word in text.split(":"))
     except ValueError:
         raise InvalidValueError(f"{option} must be start:stop:step, got {text!r}") from None
-    if not (step > 0.0 and 0.0 <= start <= stop <= 1.0):
+    if not (step > 0.0 and 0.0 <= start <= stop <= most):
         raise InvalidValueError(
-            f"{option} needs step > 0 and 0 <= start <= stop <= 1, got {text!r}"
+            f"{option} needs step > 0 and 0 <= start <= stop <= {most:g}, got {text!r}"
         )
     count = int((stop - start) / step + 1e-9) + 1
     if count > MAX_SWEEP:
@@ -240,12 +242,30 @@ def sweep(text: str, option: str = "--dynamism-sweep") -> tuple[float, ...]:
 
 
 def axis_levels(
-    dynamism: list[str] | None, motion: list[str] | None, change: list[str] | None
+    dynamism: list[str] | None,
+    motion: list[str] | None,
+    change: list[str] | None,
+    people: list[str] | None = None,
 ) -> tuple[str, tuple[float, ...], dict[str, Any]]:
-    """The axis, its levels and what is held, from the three options; default 0 to 1 dynamism."""
-    given = {"dynamism": dynamism, "motion": motion, "change": change}
-    axis, at, held = chosen(*(levels(values or [], f"--{k}") for k, values in given.items()))
-    return axis, at or levels(["0:1:0.25"]), dict(held)
+    """The axis, its levels and what is held, from the options; default 0 to 1 dynamism.
+
+    The axis is the one with several levels, else people, dynamism, motion or change, the first
+    given.
+    """
+    words = dict(zip(AXES, (dynamism, motion, change, people), strict=True))
+    given = {name: levels(values or [], f"--{name}") for name, values in words.items()}
+    several = [name for name, values in given.items() if len(values) > 1]
+    if len(several) > 1:
+        raise InvalidValueError(f"several levels of one axis only, got --{' and --'.join(several)}")
+    if given[PEOPLE] and several not in ([], [PEOPLE]):
+        raise InvalidValueError(f"--people are levels, and cannot be held beside --{several[0]}")
+    name = (several or [axis for axis in (PEOPLE, *AXES) if given[axis]] or ["dynamism"])[0]
+    if name != "dynamism" and given["dynamism"]:
+        raise InvalidValueError(
+            f"--dynamism sets both axes: with levels of --{name} give the other axis instead"
+        )
+    held = {axis: given[axis][0] for axis in ("motion", "change") if axis != name and given[axis]}
+    return name, given[name] or levels(["0:1:0.25"]), held
 
 
 def levels(values: list[str], option: str = "--dynamism") -> tuple[float, ...]:
@@ -253,7 +273,7 @@ def levels(values: list[str], option: str = "--dynamism") -> tuple[float, ...]:
     found: list[float] = []
     for word in named(values):
         if ":" in word:
-            found += sweep(word, option)
+            found += sweep(word, option, MOST_PEOPLE if option == f"--{PEOPLE}" else 1.0)
             continue
         try:
             found.append(float(word))

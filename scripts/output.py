@@ -6,7 +6,6 @@ from __future__ import annotations
 import json
 import math
 import os
-import re
 import shutil
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from contextlib import AbstractContextManager, contextmanager
@@ -46,6 +45,7 @@ GROWING = (
     "*lives/*.json", "*lives/*.json.sha256",
 )  # fmt: skip
 OLD = ".old"  # of the earlier run, while a new one takes its place
+FOREIGN = "{} holds files that mobilia did not write: choose another --out"
 STAGED, READY = ".tables.part", ".tables.ready"  # of ``together``, before and after it counts
 MAX_RECIPE_BYTES = 1 << 20
 
@@ -62,30 +62,39 @@ def whole_folder(
     Raises ``OutputError`` when ``path`` exists and ``overwrite`` is off, when it exists and holds
     no recipe of ours (then it is somebody else's and never replaced), or cannot be written. On any
     failure, Ctrl-C included, the temporary folder is removed and an earlier run stays as it was.
-    What killed runs left is removed first. After a power cut the new or the earlier run is there.
+    What killed runs left is removed first. After a power cut the new or the earlier run is there
+    (where the file system cannot swap two names, the earlier one perhaps as .NAME.PID.old).
     """
     said, path = path, path.absolute()
     temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
     made: list[Path] = []
     try:
-        made = make_folder(path.parent)
-        _put_back(path)
-        _refuse(path, overwrite, command, settings or {})
-        clear_parts(path)
-        temporary.mkdir()
-        with locked(temporary):
-            yield temporary
-            write_sums(temporary)
-            _take_place(temporary, path)
-    except OutputError as error:
-        if str(temporary) not in str(error):
-            raise
-        raise OutputError(str(error).replace(str(temporary), str(said))) from error
-    except OSError as error:
-        raise OutputError(f"cannot write {said}: {reason(error, path.parent)}") from error
+        with _told(said, temporary):
+            made = make_folder(path.parent)
+            _refuse(path, overwrite, command, settings or {})
+            clear_parts(path)
+            temporary.mkdir()
+            with locked(temporary):
+                yield temporary
+                write_sums(temporary)
+                _take_place(temporary, path)
     finally:
         remove(temporary)
         remove_empty(made)
+
+
+@contextmanager
+def _told(said: Path, temporary: Path | None = None) -> Iterator[None]:
+    """Errors of the system as ``OutputError``, which names what the user named."""
+    try:
+        yield
+    except OutputError as error:
+        if temporary is None or str(temporary) not in str(error):
+            raise
+        raise OutputError(str(error).replace(str(temporary), str(said))) from error
+    except OSError as error:
+        where = said if said.is_dir() else said.absolute().parent
+        raise OutputError(f"cannot write {said}: {reason(error, where)}") from error
 
 
 @contextmanager
@@ -97,18 +106,14 @@ def locked_folder(out: Path) -> Iterator[None]:
     """
     made: list[Path] = []
     try:
-        made = make_folder(out)
-        others = [
-            f.name for f in out.iterdir() if f.name not in locks.NAMES and not is_part(f.name)
-        ]
-        if others and not (out / RECIPE).exists():
-            raise OutputError(f"{out} holds files that mobilia did not write: choose another --out")
-        with locks.locked(out):
-            yield
-    except OutputError:
-        raise
-    except OSError as error:
-        raise OutputError(f"cannot write {out}: {reason(error, out)}") from error
+        with _told(out):
+            made = make_folder(out)
+            ours = (out / RECIPE).exists()
+            names = (f.name for f in out.iterdir())
+            if not ours and any(n not in locks.NAMES and not is_part(n) for n in names):
+                raise OutputError(FOREIGN.format(out))
+            with locks.locked(out):
+                yield
     finally:
         remove_empty(made)
 
@@ -126,15 +131,12 @@ def together(folder: Path) -> Iterator[Path]:
     put_tables(folder)
     staged = folder / STAGED
     try:
-        remove(staged)
-        staged.mkdir()
-        yield staged
-        write_sums(staged, GROWING, over=folder)
-        put(staged, folder / READY)
-    except OutputError as error:
-        raise OutputError(str(error).replace(str(staged), str(folder))) from error
-    except OSError as error:
-        raise OutputError(f"cannot write {folder}: {reason(error, folder)}") from error
+        with _told(folder, staged):
+            remove(staged)
+            staged.mkdir()
+            yield staged
+            write_sums(staged, GROWING, over=folder)
+            put(staged, folder / READY)
     finally:
         remove(staged)
     put_tables(folder)
@@ -165,7 +167,7 @@ def put_tables(folder: Path) -> None:
     ready = folder / READY
     if not ready.is_dir():
         return
-    try:
+    with _told(folder):
         places = {folder}
         for file in sorted(file for file in ready.rglob("*") if file.is_file()):
             place = folder / file.relative_to(ready)
@@ -176,8 +178,6 @@ def put_tables(folder: Path) -> None:
             sync(changed)
         shutil.rmtree(ready)
         sync(folder)
-    except OSError as error:
-        raise OutputError(f"cannot write {folder}: {reason(error, folder)}") from error
 
 
 def check_whole(folder: Path) -> None:
@@ -196,7 +196,7 @@ def _refuse(path: Path, overwrite: bool, command: str, settings: Mapping[str, An
     if not any(path.iterdir()):
         return
     if not (path / RECIPE).exists():
-        raise OutputError(f"{path} holds files that mobilia did not write: choose another --out")
+        raise OutputError(FOREIGN.format(path))
     if not overwrite:
         raise OutputError(_what_lies_there(path, command, settings))
 
@@ -241,17 +241,6 @@ def _take_place(temporary: Path, path: Path) -> None:
         raise
     sync_names(path.parent)
     remove(aside)
-
-
-def _put_back(path: Path) -> None:
-    """Where ``exchange`` cannot be had: an earlier run that a cut between two renames hid."""
-    hidden = re.compile(rf"\.{re.escape(path.name)}\.\d+{re.escape(OLD)}")
-    for old in sorted(file for file in path.parent.iterdir() if hidden.fullmatch(file.name)):
-        if path.exists():
-            remove(old)
-        else:
-            old.rename(path)
-            sync_names(path.parent)
 
 
 def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:

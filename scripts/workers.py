@@ -24,7 +24,7 @@ from scripts.options import whole
 from slam import locks
 from slam.errors import InvalidValueError, MissingDependencyError, MobiliaError, OutputError
 from slam.files import write_text
-from slam.guests import guarding
+from slam.guests import wire
 from slam.names import load, loaded
 
 MAX_JOBS = 1024
@@ -92,7 +92,7 @@ def each(
 def _processes(stack: ExitStack, jobs: int) -> dict[str, Any]:
     """Worker processes of this machine, guarded until ``stack`` ends; as joblib takes it."""
     warnings.filterwarnings("ignore", _REPLACED, UserWarning)  # from a thread of loky
-    stack.enter_context(guarding.guarded_workers())
+    stack.enter_context(wire.guarded_workers())
     if _TRACKER not in sys.warnoptions:  # handed to the tracker of semaphores: what it
         sys.warnoptions.append(_TRACKER)  # finds left over, it removes without a word
     return {

@@ -14,7 +14,7 @@ from sim.driving.drive import TourConfig
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation, n_frames
 from slam.frames import Float, Frame
-from slam.frontend.odometry_sum import MotionSum
+from slam.frontend.odometry_steps import MotionSum
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

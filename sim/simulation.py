@@ -74,7 +74,7 @@ class Simulation:
     drive      limits of the robot
     start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted; a crowd
                is put around it
-    chairs     their physics: "planar" or "free" (``sim.actors.castors``)
+    chairs     their physics: "planar" or "free" (``sim.actors.chairs``)
     tags       "truth", or "camera": beside the truth, ``tag_reading`` is what a ceiling camera
                would know of the robot by now (``sim.sensors.tag_cameras``)
     labels     whether frames carry truth per beam
@@ -96,6 +96,7 @@ class Simulation:
         kidnap_every_s: float | None = None,
         events: Sequence[Mapping[str, Any]] | None = None,
         robot: str | Mapping[str, Any] | None = None,
+        scene_sha256: str | None = None,
         laser: ScannerConfig | str | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
@@ -106,7 +107,7 @@ class Simulation:
         **options: Any,
     ) -> None:
         rates = Dynamism.of(dynamism, moving_share, motion=motion, change=change)
-        own = of_file(scene)
+        own = of_file(scene, scene_sha256)
         cues = cues_of(own.get("events", ()) if events is None else events)
         robot = own.get("robot") if robot is None else robot
         self.world = World(

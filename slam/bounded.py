@@ -4,7 +4,9 @@
 from __future__ import annotations
 
 import stat
+import tomllib
 from pathlib import Path
+from typing import Any
 
 from slam.errors import LogFormatError
 
@@ -37,3 +39,11 @@ def text_of(path: Path, most: int) -> str:
         return bytes_of(path, most).decode("utf-8")
     except UnicodeDecodeError as error:
         raise LogFormatError(path, "not a text file") from error
+
+
+def toml_of(path: Path, most: int) -> dict[str, Any]:
+    """The tables of a TOML file; ``LogFormatError`` where it is none."""
+    try:
+        return tomllib.loads(text_of(path, most))
+    except (tomllib.TOMLDecodeError, RecursionError) as error:
+        raise LogFormatError(path, f"is no TOML: {error}") from error

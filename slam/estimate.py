@@ -114,9 +114,9 @@ class Landmarks:
     covariances: Float
     looks: NDArray[np.int64]
 
-    def ellipses(self, sigmas: float = 3.0) -> Float:
-        """(n, 5) for drawing: centre x, y (m), half axes (m), direction of the first axis (rad)."""
+    def ellipses(self) -> Float:
+        """(n, 5) of 3 sigma: centre x, y (m), half axes (m), direction of the first axis (rad)."""
         values, vectors = np.linalg.eigh(self.covariances)
-        axes = sigmas * np.sqrt(np.maximum(values[:, ::-1], 0.0))
+        axes = 3.0 * np.sqrt(np.maximum(values[:, ::-1], 0.0))
         angles = np.arctan2(vectors[:, 1, 1], vectors[:, 0, 1])
         return np.column_stack([self.points_map, axes, angles])

@@ -257,3 +257,22 @@ def _free_bytes(folder: Path) -> int:
             there = os.statvfs(place)
             return there.f_bavail * there.f_frsize
     return 0
+
+
+_BEGINS = frozenset("=+-@\t\r")
+_NUMBER = re.compile(r"[-+]?(\d+(\.\d*)?([eE][-+]?\d+)?|inf|nan)")
+
+
+def cell_of(word: str) -> str:
+    """The cell that holds this word."""
+    return f"'{word}" if _is_formula(word) and not _NUMBER.fullmatch(word) else word
+
+
+def word_of(cell: str) -> str:
+    """The word that this cell holds."""
+    return cell[1:] if cell.startswith("'") and _is_formula(cell) else cell
+
+
+def _is_formula(text: str) -> bool:
+    """What has more apostrophes in front counts too, so that every word comes back the same."""
+    return text.lstrip("'")[:1] in _BEGINS

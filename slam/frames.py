@@ -299,13 +299,8 @@ class BeamLabels(ByContent):
 
     def __post_init__(self) -> None:
         n = len(self.body)
-        for name, dtype in (
-            ("body", np.int32),
-            ("kind", np.uint8),
-            ("displacement", np.float32),
-            ("incidence", np.float32),
-            ("mixed", np.bool_),
-        ):
+        dtypes = (np.int32, np.uint8, np.float32, np.float32, np.bool_)
+        for name, dtype in zip(self.__dataclass_fields__, dtypes, strict=True):
             value = frozen("BeamLabels", name, getattr(self, name), (n,), dtype)
             set_fields(self, **{name: value})
 

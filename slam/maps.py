@@ -8,6 +8,7 @@ import math
 import os
 import re
 import shutil
+import warnings
 from io import BytesIO
 from pathlib import Path
 from typing import Any
@@ -36,6 +37,7 @@ _GAP = rb"\s+(?:#[^\n]*\n\s*)*"  # PGM allows comments between the words of its 
 _PGM_HEADER = re.compile(rb"P5" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"255\s")
 _MAX_HEADER_BYTES = 4096
 MAX_PIXELS = 1 << 28  # 490 m square at 3 cm cells
+MAX_PNG_PIXELS = 178_956_970  # what Pillow unpacks, four bytes each
 _MAX_YAML_BYTES = 1 << 16
 _EDITED = ": the sum differs (after a change on purpose, delete the two lines of sums in the YAML)"
 _IMAGE_SUM, _FIELDS_SUM = "sha256 of the image:", "sha256 of the lines below:"
@@ -269,12 +271,16 @@ def _png(path: Path, data: bytes) -> tuple[NDArray[np.uint8], NDArray[np.bool_] 
     """The mean of its colours, as a map_server takes it."""
     from PIL import Image, UnidentifiedImageError
 
+    width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))  # of its IHDR
+    if data[12:16] == b"IHDR" and width * height > MAX_PNG_PIXELS:
+        raise LogFormatError(
+            path, f"{width} x {height} pixels, at most {MAX_PNG_PIXELS} are allowed in a PNG"
+        )
     try:
-        with Image.open(BytesIO(data), formats=["PNG"]) as image:
-            if image.width * image.height > MAX_PIXELS:
-                raise LogFormatError(
-                    path, f"{image.width} x {image.height} pixels, at most {MAX_PIXELS} are allowed"
-                )
+        with warnings.catch_warnings():
+            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # half of that
+            image = Image.open(BytesIO(data), formats=["PNG"])
+        with image:
             if image.mode.startswith("I"):
                 raise LogFormatError(path, "16 bits a pixel, expected 8")
             clear = image.has_transparency_data

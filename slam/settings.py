@@ -15,6 +15,7 @@ from __future__ import annotations
 import dataclasses
 import difflib
 import hashlib
+import importlib
 import json
 import math
 from collections.abc import Iterator, Mapping
@@ -91,6 +92,7 @@ class Settings:
 
     presets: ClassVar[tuple[str, ...]] = ()  # names of class methods, each of which makes a tree
     gone: ClassVar[Mapping[str, str]] = {}  # paths of before, and what is set in their place
+    constants: ClassVar[Mapping[str, str]] = {}  # groups: modules that have what left them
 
     def __post_init__(self) -> None:
         for field in dataclasses.fields(self):
@@ -223,9 +225,12 @@ def _checked(name: str, value: Any, field: dataclasses.Field[Any], about: About)
 def _no_path(owner: type[Settings], given: str, known: list[str]) -> str:
     if given in owner.gone:
         return f"{owner.__name__} has no '{given}' any more; set '{owner.gone[given]}'"
+    group, _, last = given.rpartition(".")
+    home = owner.constants.get(group, "")
+    if home and hasattr(importlib.import_module(home), last.upper()):
+        return f"{owner.__name__}: '{given}' is a constant now: {last.upper()} of {home}"
     near = difflib.get_close_matches(given, known, n=1, cutoff=0.5)
     if not near:  # the right name in another group
-        last = given.rpartition(".")[2]
         near = [path for path in known if path.rpartition(".")[2] == last][:1]
     groups = dict.fromkeys(path.partition(".")[0] for path in known)
     hint = f" Did you mean '{near[0]}'?" if near else f" It has: {', '.join(groups)}."

@@ -94,7 +94,7 @@ def test_arrows_point_down():
 
 def test_only_the_command_line_imports_verbs():
     """And what tries whole commands: a verb parses, calls and prints, and is no part of another."""
-    above = ("scripts.cli", "scripts.verbs", "scripts.robustness")
+    above = ("scripts.cli", "scripts.verbs")
     for name, found in imports().items():
         if not any(within(name, own) for own in above):
             assert not [word for word in found if within(word, "scripts.verbs")], name

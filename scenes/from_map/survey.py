@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import math
 from dataclasses import dataclass, replace
 
 import cv2
@@ -97,10 +98,15 @@ def survey(  # noqa: PLR0913 (what is known of a building)
     away = reach & ~_beside([gap.at for gap in gaps], cells)
     found = floors.spots(passable_m, away if away.any() else reach, begin, cells.cell_m)
     spots = cells.points([begin, *found])
+    rooms = _rooms(labels, cells.cell_m, cells.T_map_cells)
+    x, y = start[:2] if start is not None else spots[0]
+    if not any(a <= x <= c and b <= y <= d for own in rooms.values() for a, b, c, d in own):
+        half = math.sqrt(0.5) * floors.ROBOT_M  # in a corner that the rectangles leave out
+        rooms["start"] = ((x - half, y - half, x + half, y + half),)
     return Survey(
         start=start or (*spots[0], 0.0),
         goals=tuple(spots[1:]),
-        rooms=_rooms(labels, cells.cell_m, cells.T_map_cells),
+        rooms=rooms,
         gaps=tuple(replace(gap, at=cells.in_map(gap.at)) for gap in gaps),
         area_m2=area,
     )

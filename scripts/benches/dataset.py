@@ -10,8 +10,6 @@ from functools import partial
 from itertools import islice
 from pathlib import Path
 
-import numpy as np
-
 from scripts import workers
 from scripts.benches.world import Row, row
 from sim.moments import toured
@@ -22,7 +20,6 @@ from sim.simulation import Simulation, n_frames
 from slam.logs import read_bag
 
 WARM_S = 2.0
-LABEL_REPEATS = 3
 
 
 def rows(seconds: float, *, seed: int, dynamism: float) -> Iterator[Row]:
@@ -30,12 +27,11 @@ def rows(seconds: float, *, seed: int, dynamism: float) -> Iterator[Row]:
     recipe = Recipe(scene="office", seed=seed, dynamism=dynamism, seconds=seconds)
     with tempfile.TemporaryDirectory() as scratch:
         folder = Path(scratch)
-        made, shares, bag = _making(recipe, folder)
+        made, writing, bag = written(Simulation(**recipe.simulation()), seconds, folder)
         frames = n_frames(seconds, 1.0 / 37.5)
         yield row("episode, made", seconds / made, "× real time", "≥ 15", "simulate and write")
-        for what, share in shares.items():
-            how = "of processor time"
-            yield row(f"episode, share of {what}", 100.0 * share, "%", "", how)
+        share = 100.0 * writing / made
+        yield row("episode, share of writing", share, "%", "", "of processor time")
         size = sum(file.stat().st_size for file in bag.iterdir())
         raw = 4 * recipe.laser().spec().n_beams
         per_frame = size / (frames + n_frames(WARM_S, 1.0 / 37.5))
@@ -44,39 +40,6 @@ def rows(seconds: float, *, seed: int, dynamism: float) -> Iterator[Row]:
             rate = _reading(bag, labels)
             yield row(f"bag, read{what}", rate, "frames/s", target, "into Frames")
         yield row("two processes", _speed_up(recipe, folder), "×", "≥ 1.8", "against one, wall")
-
-
-def _making(recipe: Recipe, folder: Path) -> tuple[float, dict[str, float], Path]:
-    """Processor seconds of an episode, the shares of its parts, and the bag."""
-    spent: dict[bool, list[float]] = {False: [], True: []}
-    for labels in (False, True) * LABEL_REPEATS:  # in turn: both meet the same machine
-        spent[labels].append(_driven(recipe, labels))
-    bare, labelled = (float(np.median(spent[labels])) for labels in (False, True))
-    simulation = Simulation(**recipe.simulation())
-    made, writing, bag = written(simulation, recipe.seconds, folder)
-    return made, shares(bare, labelled, writing / made), bag
-
-
-def shares(bare: float, labelled: float, writing: float) -> dict[str, float]:
-    """Of what writing leaves, labels have what a drive takes longer with them; never below 0.
-
-    bare, labelled  s of a drive without and with labels
-    writing         share of the whole, 0 to 1, which has a clock of its own
-    """
-    labels = max(0.0, 1.0 - bare / labelled) * (1.0 - writing)
-    return {"simulation": 1.0 - writing - labels, "labels": labels, "writing": writing}
-
-
-def _driven(recipe: Recipe, labels: bool) -> float:
-    """Processor seconds of a drive that nobody writes."""
-    simulation = Simulation(**{**recipe.simulation(), "labels": labels})
-    moments = toured(simulation, recipe.seconds + WARM_S)
-    for _ in islice(moments, n_frames(WARM_S, simulation.scan_period_s)):
-        pass
-    started = time.process_time()
-    for _ in moments:
-        pass
-    return time.process_time() - started
 
 
 def written(simulation: Simulation, seconds: float, folder: Path) -> tuple[float, float, Path]:

@@ -12,19 +12,20 @@ import subprocess
 import sys
 import time
 from dataclasses import replace
-from typing import Any
 
 import numpy as np
 
 from scripts.live.network import Network
-from scripts.live.opened import Opener
+from scripts.live.session import Opener
 from scripts.live.view import View
 from sim.view.moment import Shown
 from slam.frames import NS_PER_S
+from slam.logs.bag import stamp_of
 from slam.ros.child import Domain
-from slam.ros.heard import decoded, simulated_ns
-from slam.ros.link import open_link
+from slam.ros.heard import decoded
+from slam.ros.link import Link, open_link
 from slam.ros.robot import topics
+from slam.ros.template import said_ns
 
 WARM_S = 5.0  # of compilers, left out
 SCAN = replace(topics()["/scan"], depth=1000)
@@ -33,12 +34,12 @@ SCAN = replace(topics()["/scan"], depth=1000)
 class _Timed(Network):
     """A network that notes when it sends."""
 
-    def __init__(self, *words: Any, **named: Any) -> None:
-        super().__init__(*words, **named)
+    def __init__(self, link: Link) -> None:
+        super().__init__(link)
         self.sent_ns: dict[int, int] = {}
 
     def send(self, shown: Shown) -> None:
-        self.sent_ns[shown.frame.stamp_ns] = time.time_ns()
+        self.sent_ns[said_ns(shown.frame.stamp_ns)] = time.time_ns()
         super().send(shown)
 
 
@@ -52,7 +53,7 @@ def listen(middleware: str, domain: int, router: int) -> None:
         link.wait(0.5)
         for taken in link.take(SCAN):
             now_ns = time.time_ns()
-            came[simulated_ns(decoded(SCAN.kind, taken.data).header)] = now_ns
+            came[stamp_of(decoded(SCAN.kind, taken.data), 0)] = now_ns
             last_s = time.monotonic() + 3.0
     link.close()
     print(json.dumps(sorted(came.items())))
@@ -62,13 +63,15 @@ def measure(middleware: str, seconds: float) -> None:
     """Run, and print the figures."""
     domain = Domain(middleware, own=True, wait_s=10.0)
     link = open_link(middleware, domain=domain.number, router=domain.router)
-    network = _Timed(link, height_m=0.36)
+    network = _Timed(link)
     words = [sys.executable, "-m", __spec__.name if __spec__ else "", middleware, "listen"]
     child = subprocess.Popen(
         [*words, str(domain.number), str(domain.router)], stdout=subprocess.PIPE, text=True
     )
     opener = Opener(slams=["shunting"], settings={"scene": "office"}, seconds=WARM_S + seconds + 60)
     view = View(opener, ("127.0.0.1", 0), network=network)
+    while not link.listeners(topics()["/scan"]):
+        time.sleep(0.1)
     while view.playback.present is None or view.playback.present.seconds < WARM_S:
         view.turn()
     first_ns, began_s, spent_s = (
@@ -84,7 +87,7 @@ def measure(middleware: str, seconds: float) -> None:
     view.close()
     domain.free()
     came = dict(json.loads(child.communicate(timeout=30.0)[0]))
-    sent = {stamp: at for stamp, at in network.sent_ns.items() if stamp > first_ns}
+    sent = {stamp: at for stamp, at in network.sent_ns.items() if stamp > said_ns(first_ns)}
     late_ms = [(came[stamp] - at) / 1e6 for stamp, at in sent.items() if stamp in came]
     p50, p99 = np.percentile(late_ms, [50.0, 99.0])
     print(f"{middleware}: {len(late_ms)} of {len(sent)} scans received")

@@ -96,11 +96,9 @@ class Board:
     @cached_property
     def ranking(self) -> list[Row]:
         """A row for each SLAM that made the same runs as the subject, where tracks count."""
-        return ranking(
-            {t.name: self._one_oracle(t, t.oracle) for t in self._counting}, self.subject
-        )
+        return ranking({t.name: self.one_oracle(t, t.oracle) for t in self._counting}, self.subject)
 
-    def _one_oracle(self, track: Track, oracle: str) -> list[Row]:
+    def one_oracle(self, track: Track, oracle: str) -> list[Row]:
         """Its runs; ``oracle``, which each track may have another of, by the name of all."""
         rest = [r for r in self.runs[track.name] if r["slam"] != OWN_ORACLE or oracle == OWN_ORACLE]
         return [r | {"slam": OWN_ORACLE} if r["slam"] == oracle else r for r in rest]
@@ -142,7 +140,7 @@ class Board:
         rows = [
             row | {"scene": where, "seed": f"{track.name} {row['seed']}"}
             for track in self._counting
-            for row in self._one_oracle(track, str(self.fair[track.name]["oracle"]))
+            for row in self.one_oracle(track, str(self.fair[track.name]["oracle"]))
             if row["slam"] in (self.subject, ODOMETRY, OWN_ORACLE)
         ]
         return answer(standing(rows, self.subject, where, "level", len(self._counting)))

@@ -13,7 +13,7 @@ from scripts.benchmark.board import Board
 from scripts.benchmark.published import Published
 from scripts.benchmark.sealed import SealedSeeds
 from scripts.benchmark.submission import Submission
-from scripts.benchmark.tracks import LEVELS, TEST, TRACKS, TRAIN, Track
+from scripts.benchmark.tracks import LEVELS, QUICK_LEVELS, TEST, TRACKS, TRAIN, Track
 from scripts.comparison.folder import Compared
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import Plan
@@ -29,7 +29,6 @@ from slam.errors import InvalidValueError, MissingDependencyError
 
 COMMAND = "benchmark"
 SEEDS, QUICK_SEEDS = 6, 1
-QUICK_LEVELS = (0.0, 0.5, 1.0)
 _ALIKE = ("seeds", "levels", "seconds")
 Digests = dict[str, dict[tuple[float, int], str]]  # of recordings, by track, level and seed
 Runs = dict[str, list[dict[str, Any]]]  # rows of runs.csv by track
@@ -69,6 +68,11 @@ class Wanted:
             raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
         if self.sealed is not None:
             self.sealed.check_for(self.tracks)
+        if self.submit and len({self.seeds_of(track) for track in self.tracks}) > 1:
+            raise InvalidValueError(
+                "the tracks of a submission must have the same seeds: name them with --tracks, "
+                f"got {', '.join(track.name for track in self.tracks)}"
+            )
         most = min(len(self.seeds_of(track)) for track in self.tracks)
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
@@ -107,11 +111,11 @@ class Wanted:
 
     def head(self) -> dict[str, Any]:
         """What a leaderboard says of how it was made."""
-        seeds = self.seeds_of(self.tracks[0])[: self.seeds]
+        seeds = sorted({k for track in self.tracks for k in self.seeds_of(track)[: self.seeds]})
         return {
             "tracks_run": [track.name for track in self.tracks],
             "seeds_of": submission.SEALED if self.sealed else submission.SETS[self.train],
-            "seeds": list(seeds),
+            "seeds": seeds,
             "levels_run": list(self.levels),
             "quick": self.quick,
             "seconds": self.seconds,

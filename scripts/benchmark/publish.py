@@ -1,204 +1,114 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Put a leaderboard into the docs: ``python -m scripts.benchmark.publish out/benchmark``.
+"""Fill the pages from the runs that ship: ``python -m scripts.benchmark.publish [out/days]``.
 
-Copies ``leaderboard.json`` to ``docs/results`` and writes ``leaderboard.csv`` beside it, takes the
-beginning of ``leaderboard.md`` to ``docs`` (without the tables of the tracks: the CSV has them),
-draws the two pictures of ``scripts.benchmark.picture``, and writes a row for each SLAM and each
-track into docs/benchmark.md.
-
-Scores over days (``days.json``) go to ``docs/results`` too, and as ``days.csv``; the section of
-docs/leaderboard.md is made from that file. A folder of ``scripts.benchmark.days`` has nothing else,
-and the rest stays.
+docs/benchmark.md gets the tracks, the ranking and the picture, docs/leaderboard.md what was lost at
+the top of each track. The folder of ``scripts.benchmark.days`` goes to ``docs/results``, as
+``days.json`` and ``days.csv``; the section at the end of docs/leaderboard.md is made from it.
 """
 
 from __future__ import annotations
 
 import argparse
 import json
-import math
 import sys
-from collections.abc import Callable, Iterable, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from scripts.benchmark import days, picture, published
 from scripts.benchmark.board import RANKED_HEADS, Board, markdown_table
-from scripts.benchmark.published import Published
-from scripts.benchmark.scores import COLUMNS, SILENT, TRACKING, lost_from
-from scripts.benchmark.tracks import LEVELS, TRACKS
+from scripts.benchmark.published import Published, Row
+from scripts.benchmark.tracks import LEVELS, Track, newest
 from scripts.comparison.csv_files import write_csv
 from scripts.days.scores import LEVEL_COLUMNS, levels
 from scripts.marks import fill_page
-from scripts.metrics.row import digits
 from scripts.result_files import RESULTS, ROOT
-from slam.errors import InvalidValueError, MobiliaError
-from slam.evaluation.statistics import quantile
+from slam.errors import MobiliaError
 from slam.files import write_text
 
 DOCS = ROOT / "docs"
-PAGE, MARK, BOARD = "benchmark.md", "leaderboard", "leaderboard.md"
-CM, PERCENT = 100.0, 100.0
-HEADS = (
-    "SLAM", "lost from", "tracks on which half of the runs are lost", "lost at level 1, %",
-    "error while not lost, cm", "silent, % of scans", "rank correlation ≥ 0.9 on", "ms a scan, p50",
-)  # fmt: skip
+_COUNTS = {True: "yes", False: "no", None: "open"}
+PAGE, BOARD = "benchmark.md", "leaderboard.md"
 
 
-def tracks_table(board: dict[str, Any]) -> str:
-    """A row for each track of the board that is declared here."""
+def tracks_of(of: Published) -> list[Track]:
+    """The newest version of each that it has runs of."""
+    return [track for track in newest().values() if track.name in of.runs]
+
+
+def tracks_table(tracks: Sequence[Track]) -> str:
+    """A row for each."""
     table = []
-    for track in (TRACKS[name] for name in board["tracks"] if name in TRACKS):
+    for track in tracks:
         says = f"{track.axis}: {', '.join(word.split(' ', 1)[0] for word in track.says)}"
-        words = [f"`{track.name}`", track.about, says, track.scene]
-        table.append([*words, f"{track.seconds:g}", str(track.world)])
-    levels = f"level {', '.join(f'{at:g}' for at in LEVELS)}"
-    return markdown_table(("track", "what happens", levels, "scene", "s", "world"), table, left=4)
+        words = [f"`{track.name}`", track.about, says, track.scene, f"{track.seconds:g}"]
+        table.append([*words, _COUNTS[track.counts]])
+    heads = ("track", "what happens", f"level {_list(LEVELS)}", "scene", "s", "counts")
+    return markdown_table(heads, table, left=4)
 
 
-def rows(board: dict[str, Any]) -> list[list[str]]:
-    """A row for each SLAM over the tracks that count, by the level it is lost from, then error."""
-    counting = {name for name, track in board["tracks"].items() if track["counts"]}
-    own: dict[str, list[dict[str, Any]]] = {}
-    for row in board["leaderboard"].values():
-        if row["track"] in counting:
-            slam = picture.shown_name(row["slam"])
-            own.setdefault(slam, []).append(row)
-    if not own:
-        raise InvalidValueError("no track of the leaderboard counts")
-    at = {slam: _lost_from(board, found) for slam, found in own.items()}
-
-    def rank(item: tuple[str, list[dict[str, Any]]]) -> tuple[float, float, float]:
-        slam, found = item
-        return -at[slam], _mean(found, "lost_at_top"), _middle(found, TRACKING)
-
-    return [_row(slam, at[slam], found) for slam, found in sorted(own.items(), key=rank)]
-
-
-def _lost_from(board: dict[str, Any], found: Sequence[dict[str, Any]]) -> float:
-    """The level from which half of the runs of all these tracks are lost."""
-    of = [board["lost_shares"][f"{row['track']} {row['slam']}"] for row in found]
-    each = zip(*(shares["lost"] for shares in of), strict=True)
-    return lost_from(of[0]["levels"], [sum(level) / len(level) for level in each])
-
-
-def _row(slam: str, at: float, found: Sequence[dict[str, Any]]) -> list[str]:
-    broken = sum(math.isfinite(float(row["lost_from"])) for row in found)
-    ranked = [float(row["spearman"]) for row in found if row["spearman"] is not None]
-    return [
-        f"`{slam}`",
-        f"{at:.2g}" if math.isfinite(at) else f"> {LEVELS[-1]:g}",
-        f"{broken} of {len(found)}",
-        f"{PERCENT * _mean(found, 'lost_at_top'):.0f}",
-        _median(found, TRACKING, CM),
-        "–"
-        if all(row[SILENT] is None for row in found)
-        else f"{PERCENT * _mean(found, SILENT):.1f}",
-        f"{sum(value >= 0.9 for value in ranked)} of {len(ranked)}",
-        _median(found, "ms_per_scan_p50", 1.0),
-    ]
-
-
-def _values(found: Sequence[dict[str, Any]], key: str) -> list[float]:
-    return [float(row[key]) for row in found if row[key] is not None]
-
-
-def _mean(found: Sequence[dict[str, Any]], key: str) -> float:
-    values = _values(found, key)
-    return sum(values) / len(values) if values else math.inf
-
-
-def _middle(found: Sequence[dict[str, Any]], key: str) -> float:
-    values = _values(found, key)
-    return quantile(values, 0.5) if values else math.inf
-
-
-def _median(found: Sequence[dict[str, Any]], key: str, factor: float) -> str:
-    value = _middle(found, key)
-    return digits(factor * value) if math.isfinite(value) else "–"
-
-
-def told(board: dict[str, Any]) -> str:
-    """The table and how it was made."""
-    counting = [name for name, track in board["tracks"].items() if track["counts"]]
-    left = [f"`{name}`" for name in board["tracks"] if name not in counting]
-    made = (
-        f"{len(counting)} tracks that count, {len(board['levels_run'])} levels, "
-        f"{len(board['seeds'])} seeds from {min(board['seeds'])}. Errors and times are medians of "
-        "the tracks, the rest are means."
-    )
-    if left:
-        made += f" Left out, because the oracle was lost or off there: {', '.join(left)}."
-    return f"{markdown_table(HEADS, rows(board), left=1)}\n\n{made}\n\n{_broken(board)}"
-
-
-def _broken(board: dict[str, Any]) -> str:
-    """How many SLAMs lose half of their runs at the top, track by track; controls aside."""
-    by_track: dict[str, list[bool]] = {}
-    for row in board["leaderboard"].values():
-        if not picture.is_control(picture.shown_name(row["slam"])):
-            by_track.setdefault(row["track"], []).append(float(row["lost_at_top"]) >= 0.5)
-    said = (f"`{name}` {sum(lost)} of {len(lost)}" for name, lost in by_track.items())
-    return f"SLAMs that lose half of their runs or more at level 1: {', '.join(said)}."
+def board_of(of: Published) -> Board:
+    """What ships, as a board."""
+    runs = {
+        track.name: of.rows(track.name, {at: own[0] for at, own in of.runs[track.name].items()}, ())
+        for track in tracks_of(of)
+    }
+    return Board(subject="shunting", head={}, tracks=tracks_of(of), runs=runs)
 
 
 def shipped(of: Published) -> str:
-    """The ranking of the runs that ship with the package, and what they are."""
-    tracks = [track for track in TRACKS.values() if track.counts and track.name in of.runs]
-    runs = {
-        track.name: of.rows(track.name, {at: own[0] for at, own in of.runs[track.name].items()}, ())
-        for track in tracks
-    }
-    board = Board(subject="shunting", head={}, tracks=tracks, runs=runs)
-    asked = [at for own in of.runs.values() for at in own]
-    levels, seeds = (sorted({at[k] for at in asked}) for k in (0, 1))
+    """The ranking, and what it is of."""
+    board = board_of(of)
     made, on = of.made_with, of.made_with["machine"]["processor"]
     return (
-        f"{markdown_table(RANKED_HEADS, board.ranked(), left=2)}\n\n"
-        f"{board.ranking[0]['runs']} runs: {len(tracks)} tracks, levels "
-        f"{', '.join(f'{level:g}' for level in levels)}, seeds {', '.join(map(str, seeds))}; "
+        f"{markdown_table(RANKED_HEADS, board.ranked(), left=2)}\n\n{_ranked_runs(board)}; "
         f"commit {made['commit']}, {on}, MuJoCo {made['versions']['mujoco']}."
     )
 
 
-def publish(folder: Path, docs: Path, results: Path, commit: str) -> None:
-    """Copy, draw and fill; raises ``LogFormatError`` for what is no leaderboard."""
-    source, aged = folder / "leaderboard.json", folder / days.NAMES[1]
-    if aged.exists():
-        days.read(aged)
-    if source.exists() or not aged.exists():
-        _publish_board(folder, docs, results, commit)
-    if aged.exists():
-        _copy(aged, results / aged.name, commit, _made_days)
-    _publish_days(docs / BOARD, results / aged.name)
+def _ranked_runs(board: Board) -> str:
+    one, counting = board.ranking[0], len(published.read().quick(board.tracks))
+    return f"{one['runs']} runs: {counting} tracks that count, levels {_list(one['levels'])}"
 
 
-def _publish_board(folder: Path, docs: Path, results: Path, commit: str) -> None:
-    source = folder / "leaderboard.json"
-    lost = picture.read(source)
-    board = json.loads(source.read_text(encoding="utf-8"))
-    text, tracks = told(board), tracks_table(board)
-    _copy(source, results / "leaderboard.json", commit, _made_board)
-    rows = list(json.loads(source.read_text(encoding="utf-8"))["leaderboard"].values())
-    write_csv(results / "leaderboard.csv", rows, COLUMNS)
-    write_text(docs / BOARD, beginning((folder / BOARD).read_text(encoding="utf-8"), lost.tracks))
-    picture.overall(lost, docs / "pictures" / "benchmark.png")
-    picture.by_track(lost, docs / "pictures" / "benchmark_tracks.png")
-    fill_page(docs / PAGE, MARK, text, most=len(text))  # the table of the page, however many SLAMs
-    fill_page(docs / PAGE, "tracks", tracks, most=len(tracks))
-    fill_page(docs / PAGE, "shipped", ships := shipped(published.read()), most=len(ships))
+def at_the_top(of: Published) -> str:
+    """Runs lost at level 1, of how many: a row for each track, a column for each SLAM."""
+    board = board_of(of)
+    rows = {track.name: board.one_oracle(track, track.oracle) for track in board.tracks}
+    there = [row["slam"] for own in rows.values() for row in own]
+    slams = list(dict.fromkeys([*(row["slam"] for row in board.ranking), *there]))
+    lines = [
+        [track.name, _COUNTS[track.counts], *(_lost(rows[track.name], s) for s in slams)]
+        for track in board.tracks
+    ]
+    return markdown_table(["track", "counts", *slams], lines, left=2)
 
 
-def beginning(page: str, tracks: Iterable[str]) -> str:
-    """``leaderboard.md`` without what it says of each track: that is in the CSV."""
-    cuts = [at for name in tracks if (at := page.find(f"\n## {name}\n")) >= 0]
-    return f"{page[: min(cuts)].rstrip()}\n\n{_EACH}\n" if cuts else page
+def _lost(rows: Sequence[Row], slam: str) -> str:
+    own = [row["lost"] for row in rows if (row["slam"], row["dynamism"]) == (slam, LEVELS[-1])]
+    return f"{sum(own)} of {len(own)}" if own else "–"
 
 
-_EACH = (
-    "Errors, silent failures, times and memory of each SLAM on each track are in "
-    "[leaderboard.csv](results/leaderboard.csv) ([its columns](benchmark.md#what-the-leaderboard-"
-    "says)), the levels of each track in [benchmark](benchmark.md#the-tracks)."
-)
+def _list(values: Sequence[float]) -> str:
+    return ", ".join(f"{value:g}" for value in values)
+
+
+def publish(docs: Path, results: Path, aged: Path | None, commit: str) -> None:
+    """Draw and fill; raises ``LogFormatError`` for a folder without scores over days."""
+    if aged is not None:
+        days.read(aged / days.NAMES[1])
+        _copy_days(aged / days.NAMES[1], results / days.NAMES[1], commit)
+    of = published.read()
+    board = board_of(of)
+    picture.overall(board.ranking, _ranked_runs(board), docs / "pictures" / "benchmark.png")
+    for page, mark, told in (
+        (PAGE, "tracks", tracks_table(list(newest().values()))),
+        (PAGE, "shipped", shipped(of)),
+        (BOARD, "top", at_the_top(of)),
+    ):
+        fill_page(docs / page, mark, told, most=len(told))  # the table of the page, however long
+    _publish_days(docs / BOARD, results / days.NAMES[1])
+
 
 _DAYS = (
     "All scores with their intervals: [days.csv](results/days.csv); of each building: "
@@ -206,18 +116,14 @@ _DAYS = (
 )
 
 
-def _copy(source: Path, copy: Path, commit: str, made: Callable[[dict[str, Any]], str]) -> None:
+def _copy_days(source: Path, copy: Path, commit: str) -> None:
     """The file, with the command that makes it and the commit on top if there is a commit."""
     text = source.read_text(encoding="utf-8")
     if commit:
-        command = json.dumps(made(json.loads(text)))
+        command = json.dumps(_made_days(json.loads(text)))
         head = f'{{\n "command": {command},\n "commit": {json.dumps(commit)},\n'
         text = text.replace("{\n", head, 1)
     write_text(copy, text)
-
-
-def _made_board(board: dict[str, Any]) -> str:
-    return f"mobilia benchmark --slam {' '.join(board['slams'])}"
 
 
 def _made_days(told: dict[str, Any]) -> str:
@@ -236,15 +142,15 @@ def _publish_days(page: Path, results: Path) -> None:
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Publish one."""
+    """Publish."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folder", type=Path, help="of mobilia benchmark, or of benchmark.days")
+    parser.add_argument("days", type=Path, nargs="?", help="a folder of benchmark.days")
     parser.add_argument("--docs", type=Path, default=DOCS)
     parser.add_argument("--results", type=Path, default=RESULTS)
-    parser.add_argument("--commit", default="", help="of the code that ran")
+    parser.add_argument("--commit", default="", help="of the code that ran the days")
     wanted = parser.parse_args(arguments)
     try:
-        publish(wanted.folder, wanted.docs, wanted.results, wanted.commit)
+        publish(wanted.docs, wanted.results, wanted.days, wanted.commit)
     except (MobiliaError, OSError) as error:
         print(error, file=sys.stderr)
         return 1

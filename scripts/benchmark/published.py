@@ -4,26 +4,37 @@
 A reader's SLAM gets a row between the others on the same recordings, without running the others.
 Each recording is named by its digest, so that nothing is compared on other scans.
 
-    python -m scripts.benchmark.published out/benchmark --commit HASH   # writes published.json
+    python -m scripts.benchmark.published out/quick out/top --commit HASH   # writes published.json
+    python -m scripts.benchmark.published out/top --run shunting --levels 1 --seeds 20
 """
 
 from __future__ import annotations
 
 import argparse
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
 from typing import Any
 
 from scripts.benchmark.submission import RUN, SHA256
-from scripts.benchmark.tracks import LEVELS, TRACKS, check_known
+from scripts.benchmark.tracks import (
+    LEVELS,
+    QUICK_LEVELS,
+    TRACKS,
+    Track,
+    check_known,
+    chosen,
+)
 from scripts.comparison.folder import read as compared
+from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
 from scripts.comparison.rules import MAX_DEPTH, Rule, check_keys, is_shallow, number
+from scripts.console import note
 from scripts.machine import machine, versions
+from scripts.report.answer import ODOMETRY
 from scripts.result_files import finite, load, write
 from sim.core.versions import WORLD, world_of
 from slam.errors import InvalidValueError, LogFormatError, MobiliaError
@@ -53,6 +64,14 @@ class Published:
         """Whether that SLAM made all these runs."""
         own = self.runs.get(track, {})
         return all(run in own and slam in own[run][1] for run in digests)
+
+    def quick(self, tracks: Iterable[Track]) -> tuple[Track, ...]:
+        """Those that count, and whose first seed is here at the levels of a quick benchmark."""
+        return tuple(
+            track for track in tracks
+            if track.counts is not False
+            and self.has(track.name, [(at, track.test[0]) for at in QUICK_LEVELS], ODOMETRY)
+        )  # fmt: skip
 
     def rows(self, track: str, digests: Digests, without: Sequence[str]) -> list[Row]:
         """Rows as of ``runs.csv`` of the runs on these very recordings, but for some SLAMs."""
@@ -115,11 +134,12 @@ def digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:
 
 
 def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
-    """Of folders of ``mobilia benchmark``, all tracks that are whole in them.
+    """Of folders of ``mobilia benchmark``, all tracks that are whole in them, beside what is there.
 
     Raises ``InvalidValueError`` for two folders whose recordings differ.
     """
-    runs, hashes = dict[str, Row](), dict[str, str]()
+    before: dict[str, Any] = load(path, WHAT, SCHEMA) if path.exists() else {}
+    runs, hashes = dict[str, Row](before.get("runs", {})), dict[str, str](before.get("tracks", {}))
     for folder, track in product(folders, TRACKS.values()):
         if not (folder / track.name / "recipe.json").exists():
             continue
@@ -128,17 +148,24 @@ def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
         hashes[track.name] = track.sha256
         plan = track.plan(asked["slams"], tuple(asked["seeds"]), levels=tuple(asked["levels"]))
         for at, scans in digests(plan, folder / track.name).items():
-            own = {r["slam"]: [finite(r.get(k)) for k in COLUMNS]
+            own = {r["slam"]: [_short(r.get(k)) for k in COLUMNS]
                    for r in rows if (r["dynamism"], r["seed"]) == at}  # fmt: skip
             key = f"{track.name} {at[0]:g} {at[1]}"
             there = runs.setdefault(key, {"recording": scans, "slams": {}})
             if there["recording"] != scans:
                 raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
             there["slams"] |= own
-    made = {"commit": commit, "versions": versions(), "machine": machine()}
+    made: Row = {"commit": commit, "versions": versions(), "machine": machine()}
+    on = {of["machine"]["processor"]: None for of in (before.get("made_with", made), made)}
+    made["machine"]["processor"] = ", ".join(on)
     head = {"schema": SCHEMA, "what": WHAT, "world": WORLD, "made_with": made, "columns": COLUMNS}
     write(path, head, {"tracks": hashes, "runs": runs})
     return read(path)
+
+
+def _short(value: Any) -> Any:
+    """Six digits: nobody reads more, and all of this is in the package."""
+    return float(f"{value:.6g}") if isinstance(value, float) and finite(value) else finite(value)
 
 
 _HEAD: Mapping[str, Rule] = {
@@ -161,13 +188,27 @@ _RUN: Mapping[str, Rule] = {
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
-    """Write the file."""
+    """Run what is to be published, or write the file."""
     parser = argparse.ArgumentParser(description=__doc__)
-    parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark")
+    parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark, or --run")
     parser.add_argument("--out", type=Path, default=FILE)
-    parser.add_argument("--commit", required=True, help="of the code that ran")
+    parser.add_argument("--commit", help="of the code that ran")
+    parser.add_argument("--run", nargs="+", metavar="SLAM", help="only run these into the folder")
+    parser.add_argument("--tracks", nargs="+", help="default the newest of all")
+    parser.add_argument("--levels", type=float, nargs="+", default=list(LEVELS))
+    parser.add_argument("--first", type=int, default=0, help="of the test seeds")
+    parser.add_argument("--seeds", type=int, default=1)
     wanted = parser.parse_args(arguments)
     try:
+        if wanted.run:
+            for track in chosen(wanted.tracks):
+                seeds = track.test[wanted.first : wanted.first + wanted.seeds]
+                plan = track.plan(wanted.run, seeds, levels=tuple(wanted.levels))
+                note(f"{track.name}: {track.about}")
+                compare(plan, wanted.folders[0] / track.name)
+            return 0
+        if not wanted.commit:
+            raise InvalidValueError("--commit must say of which code the runs are")
         made = write_from(wanted.folders, wanted.out, wanted.commit)
     except (MobiliaError, OSError) as error:
         print(error, file=sys.stderr)

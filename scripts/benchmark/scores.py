@@ -246,10 +246,10 @@ def _ranked(slam: str, runs: Sequence[tuple[tuple[str, float, int], Row]]) -> Ro
         table[rooms.index((track, seed)), levels.index(level)] = row["lost"]
     whole = table[~np.isnan(table).any(axis=1)]
     low, high = lost_from_interval(levels, whole)
-    errors = _values([row for _, row in runs], TRACKING)
+    errors, shares = _values([row for _, row in runs], TRACKING), np.nanmean(table, axis=0)
     return {
-        "slam": slam, "runs": len(runs), "lost_runs": int(np.nansum(table)),
-        "lost_from": lost_from(levels, np.nanmean(table, axis=0)),
-        "lost_from_low": low, "lost_from_high": high,
+        "levels": levels, "lost_shares": shares.tolist(), "slam": slam,
+        "runs": len(runs), "lost_runs": int(np.nansum(table)),
+        "lost_from": lost_from(levels, shares), "lost_from_low": low, "lost_from_high": high,
         TRACKING: quantile(errors, 0.5) if errors else None, f"{TRACKING}_runs": len(errors),
     }  # fmt: skip

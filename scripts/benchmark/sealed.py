@@ -18,7 +18,7 @@ from pathlib import Path
 from typing import Any
 
 from scripts.benchmark.submission import MAX_SEED, MAX_SEEDS, SEALED, SEEDS
-from scripts.benchmark.tracks import TEST, TRAIN, Track, check_known, newest
+from scripts.benchmark.tracks import FRESH, TEST, TRAIN, Track, check_known, newest
 from scripts.result_files import load
 from sim.core.versions import WORLD, world_of
 from slam.errors import InvalidValueError, LogFormatError, OutputError
@@ -66,7 +66,7 @@ def drawn(count: int) -> SealedSeeds:
     """So many, by chance that cannot be repeated; none that is published already."""
     if not 1 <= count <= MAX_SEEDS:
         raise InvalidValueError(f"--seeds must be 1 to {MAX_SEEDS}, got {count}")
-    known, seeds = {*TRAIN, *TEST}, list[int]()
+    known, seeds = {*TRAIN, *TEST, *FRESH}, list[int]()
     while len(seeds) < count:
         seed = secrets.randbelow(MAX_SEED + 1)
         if seed not in known:
@@ -106,7 +106,7 @@ def read(path: Path) -> SealedSeeds:
         )
     check_known(path, world, tracks)
     seeds, salt = data[SEALED], data["salt"]
-    if not SEEDS.holds(seeds) or {*TRAIN, *TEST} & set(seeds):
+    if not SEEDS.holds(seeds) or {*TRAIN, *TEST, *FRESH} & set(seeds):
         wanted = f"{SEEDS.wanted}, each once, and none that is published"
         raise LogFormatError(path, f"seeds must be {wanted}")
     if not isinstance(salt, str) or not _SALT.fullmatch(salt):

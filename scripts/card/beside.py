@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from pathlib import Path
 
 import numpy as np
@@ -24,10 +24,6 @@ COLORS = ("#1f61be", "#168c5a", "#de6e18", "#7a3fb0", "#59616e")
 OURS = "#ce2c3c"
 MARKS = ("s", "^", "D")  # of ours
 APART = 0.11  # of a group's width, from card to card
-SHARES = {
-    "no_return": "no return,\nall beams", "holes": "no return,\nin walls",
-    "edge_lost": "lost beam\nat an edge", "edge_jumps": "edge beams\nthat move 5 cm",
-}  # fmt: skip
 Cards = dict[str, ScannerCard]
 
 
@@ -89,24 +85,22 @@ def amount(card: ScannerCard) -> str:
 
 @styled({"font.size": 9})
 def draw(path: Path, real: Cards, ours: Cards) -> None:
-    """Noise, deviation about walls, edges and lost beams as a PNG; ours are red."""
-    picture = Picture(figsize=(10.0, 7.2), layout="constrained")
-    panels = picture.subplots(2, 2)
-    for ax, key, title in (
-        (panels[0, 0], "standing", "Noise from scan to scan, robot at rest"),
-        (panels[0, 1], "wall", "Deviation about straight walls"),
-    ):
-        seen = {key_of(key, *ends): f"{ends[0]:g}–{ends[1]:g}" for ends in RANGE_BINS_M}
+    """Noise, deviation about walls and edges as a PNG; ours are red."""
+    picture = Picture(figsize=(13.0, 4.4), layout="constrained")
+    panels = picture.subplots(1, 3)
+    for ax, key, bins, unit, title in zip(
+        panels, ("standing", "wall", "between"), (RANGE_BINS_M, RANGE_BINS_M, DEPTH_BINS_M),
+        ("one sigma, mm", "one sigma, mm", "share of edges, %"),
+        ("Noise from scan to scan, robot at rest", "Deviation about straight walls",
+         "Edges with a range between their sides"), strict=True,
+    ):  # fmt: skip
+        words = {key_of(key, *ends): f"{ends[0]:g}–{ends[1]:g}" for ends in bins}
         every = (real | ours).values()
-        seen = {bin_: w for bin_, w in seen.items() if any(c.figures[bin_].n for c in every)}
-        _groups(ax, seen, 1e3, real, ours)
-        ax.set(title=title, xlabel="range in m", ylabel="one sigma, mm", ylim=(0.0, None))
-    depths = {key_of("between", *ends): f"{ends[0]:g}–{ends[1]:g}" for ends in DEPTH_BINS_M}
-    _groups(panels[1, 0], depths, 1e2, real, ours)
-    panels[1, 0].set(title="Edges with a range between their sides", ylim=(0.0, None),
-                     xlabel="depth of the edge in m", ylabel="share of edges, %")  # fmt: skip
-    _shares(panels[1, 1], real, ours)
-    handles, names = panels[0, 1].get_legend_handles_labels()
+        words = {bin_: w for bin_, w in words.items() if any(c.figures[bin_].n for c in every)}
+        _groups(ax, words, 1e2 if key == "between" else 1e3, real, ours)
+        what = "depth of the edge in m" if key == "between" else "range in m"
+        ax.set(title=title, xlabel=what, ylabel=unit, ylim=(0.0, None))
+    handles, names = panels[1].get_legend_handles_labels()
     picture.legend(handles, names, loc="outside lower center", ncols=4, frameon=False)
     save(picture, path)
 
@@ -130,14 +124,3 @@ def _groups(ax: Axes, words: Mapping[str, str], scale: float, real: Cards, ours:
     ax.set_xlim(-0.5, len(words) - 0.5)
     ax.set_xticks(range(len(words)), list(words.values()))
     ax.tick_params(axis="x", length=0)
-
-
-def _shares(ax: Axes, real: Cards, ours: Cards) -> None:
-    _groups(ax, SHARES, 1e2, real, ours)
-    shown: Sequence[Figure] = [c.figures[key] for c in (real | ours).values() for key in SHARES]
-    tallest = max((1e2 * figure.value for figure in shown if figure.n), default=1.0)
-    ax.set(title="Lost beams, and edges that do not stay", ylabel="share, %")
-    ax.set_yscale("symlog", linthresh=0.1)
-    ax.set_ylim(-0.01, 2.0 * max(tallest, 1.0))
-    ax.set_yticks([0.0, 0.1, 1.0, 10.0, *([50.0] if tallest > 25.0 else [])])
-    ax.yaxis.set_major_formatter(lambda value, _: f"{value:g}")

@@ -10,6 +10,7 @@ from typing import NamedTuple
 from rich.markup import escape
 from rich.table import Table
 
+from scripts.marks import with_tables_apart
 from sim.sensors.lidar.registry import DEFAULT, describe
 from sim.sensors.lidar.sheet import NOT_STATED
 from slam.files import make_folder, write_text
@@ -49,14 +50,15 @@ def printed(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) 
 
 
 def write(out: Path, name: str, lines: Sequence[str]) -> Path:
-    """A page ``name``.md in the folder ``out``."""
+    """A page ``name``.md in the folder ``out``; long tables as CSV in its ``results``."""
     make_folder(out)
-    write_text(out / f"{name}.md", "\n".join(lines) + "\n")
+    text = with_tables_apart("\n".join(lines) + "\n", name, out / "results", out)
+    write_text(out / f"{name}.md", text)
     return out / f"{name}.md"
 
 
 def page(scanner: str, rows: Sequence[Row]) -> list[str]:
-    """The card of a scanner; that of the LMS-221 has pictures and notes."""
+    """The card of a scanner; that of the LMS-221 has a picture and notes."""
     usual = scanner == DEFAULT
     title, name, option = "SICK LMS-221", "LMS-221", ""
     if not usual:
@@ -88,8 +90,6 @@ def _sources(scanner: str) -> tuple[str, ...]:
 SOURCES = (
     "Sources: TD is SICK's technical description 8008970/06-2003. TL is the telegram",
     "listing 8007954/2006-08-01. STW is the ROS driver `sicktoolbox_wrapper`.",
-    "",
-    "![Card](pictures/sensor_card.png)",
 )
 NOTES = (
     "",

@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pictures of the LMS-221's card: six panels beside its data sheet, and what each effect does
-to a wall, a corner, a chair, a leg, a pane."""
+"""The picture of the LMS-221's card: what each effect does to a wall, a chair, a leg, a pane."""
 
 from __future__ import annotations
 
-import math
 from collections.abc import Mapping
 from pathlib import Path
 
@@ -13,16 +11,12 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from scripts.card import rows as measure
 from scripts.card.bench import Bench, box, only, post
 from scripts.figures import save, styled
-from sim.sensors.lidar.models.lms221 import NEEDED, Lms221Config
-from sim.sensors.lidar.receiver import needed_reflectivity
-from slam.files import make_folder
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam.frames import Float
 
-INK, RED, BLUE, GREY = "#222222", "#ce2c3c", "#1f61be", "#8a8a8a"
-TARGETS = {"white paper": 0.80, "black trousers": 0.08, "black rubber": 0.02}  # reflectivity
+RED, GREY = "#ce2c3c", "#8a8a8a"
 Window = tuple[float, float, float, float]
 _BACK = box(4.05, 0.0, 0.05, 2.5)
 # Name -> (MJCF, window of the picture: x from, x to, y from, y to in m).
@@ -68,99 +62,12 @@ SCANS = 12
 
 
 @styled({"font.size": 8, "grid.alpha": 0.3})
-def draw(folder: Path) -> None:
-    """Write both as PNGs with a palette: of few colours, a third of the bytes."""
-    make_folder(folder)
-    for figure, name in ((_card(), "sensor_card"), (_ablation(), "sensor_ablation")):
-        path = folder / f"{name}.png"
-        save(figure, path)
-        with Image.open(path) as picture:
-            small = picture.convert("RGB").quantize(64, dither=Image.Dither.NONE)
-        small.save(path, optimize=True)
-
-
-# -- beside the data sheet ------------------------------------------------------------------------
-
-
-def _card() -> Figure:
-    """Six panels: noise, systematic error, spot, needed reflectivity, timing, range."""
-    figure = Figure(figsize=(10.0, 5.6), layout="constrained")
-    panels = figure.subplots(2, 3).ravel()
-    for draw_panel, ax in zip((_noise, _bias, _spot, _needed, _times, _rate), panels, strict=True):
-        draw_panel(ax)
-    return figure
-
-
-def _noise(ax: Axes) -> None:
-    for mode, color, shift in (("32m", BLUE, -0.15), ("80m", RED, 0.15)):
-        std = [1e3 * measure.noise_std(d, mode) for d in measure.NOISE_AT_M]
-        at = np.arange(len(std)) + shift
-        ax.bar(at, std, 0.28, color=color, label=f"{mode} mode, measured")
-    ax.axhline(10.0, color=INK, lw=1.0, ls="--", label="data sheet, TD p34")
-    ax.set_xticks(range(len(measure.NOISE_AT_M)), [f"{d:g} m" for d in measure.NOISE_AT_M])
-    ax.set(title="statistical error, one sigma", ylabel="mm", ylim=(0, 15))
-    ax.legend(fontsize=7, loc="upper left")
-
-
-def _bias(ax: Axes) -> None:
-    true, curves = measure.systematic_curves("32m", 40)
-    ax.plot(true, 1e3 * curves.T, color=GREY, lw=0.4, alpha=0.6)
-    ax.plot(true, 1e3 * curves[3], color=BLUE, lw=1.4, label="one of 40 units (grey: the others)")
-    for bound in (-35.0, 35.0):
-        label = "data sheet, TD p34" if bound > 0 else None
-        ax.axhline(bound, color=INK, lw=1.0, ls="--", label=label)
-    ax.set(title="systematic error, mm mode", xlabel="range [m]", ylabel="mm", ylim=(-50, 75))
-    ax.legend(fontsize=7, loc="upper right")
-
-
-def _spot(ax: Axes) -> None:
-    at = np.linspace(0.0, 21.0, 40)
-    ax.plot(at, [100 * measure.spot_diameter(d) for d in at], color=BLUE, label="seven rays (D4σ)")
-    ax.plot(measure.SPOT_AT_M, measure.SPOT_CM, "o", color=INK, ms=4, label="TL table 10-1")
-    ax.set(title="diameter of the spot", xlabel="range [m]", ylabel="cm")
-    ax.legend(fontsize=7, loc="upper left")
-
-
-def _needed(ax: Axes) -> None:
-    at = np.geomspace(0.16, 60.0, 50).tolist()
-    found = [100 * measure.least_reflectivity(d) for d in at]
-    ax.loglog(at, found, color=BLUE, label="measured")
-    ax.loglog(*(np.array(NEEDED) * (1.0, 100.0)).T, "o", color=INK, ms=4, label="TD fig. 4-2")
-    ax.axhline(10.0, color=GREY, lw=0.8, ls=":")
-    ax.set(title="reflectivity needed for a return", xlabel="range [m]", ylabel="%")
-    ax.set_xticks([0.2, 0.5, 1, 2, 5, 10, 30, 60], ["0.2", "0.5", "1", "2", "5", "10", "30", "60"])
-    ax.set_yticks([1, 2, 5, 10, 20, 50, 100], ["1", "2", "5", "10", "20", "50", "100"])
-    ax.minorticks_off()
-    ax.legend(fontsize=7, loc="upper center")
-
-
-def _times(ax: Axes) -> None:
-    spec = Lms221Config(resolution_deg=0.5).spec()
-    degrees = np.rad2deg(spec.angles)
-    for turn, color in ((0, BLUE), (1, RED)):
-        mine = slice(turn, None, 2)
-        times = 1e3 * spec.beam_time_offsets[mine]
-        ax.plot(degrees[mine], times, color=color, lw=1.6, label=f"turn {turn + 1} of the mirror")
-    ax.set(title="time of each beam, 0.5°", xlabel="angle [°]", ylabel="ms")
-    ax.set_xticks([-90, -45, 0, 45, 90])
-    ax.legend(fontsize=7, loc="lower right")
-
-
-def _rate(ax: Axes) -> None:
-    at = np.geomspace(0.16, 79.0, 400).tolist()
-    for row, (name, value) in enumerate(TARGETS.items()):
-        seen = np.array([value >= needed_reflectivity(NEEDED, d) for d in at])
-        lit = np.where(seen, row, math.nan)
-        ax.plot(at, lit, lw=9, color=(BLUE, INK, RED)[row], solid_capstyle="butt")
-        ax.text(0.17, row + 0.2, f"{name}, {100 * value:g} %", fontsize=8)
-    ax.set_xscale("log")
-    title = "range at which a full target returns"
-    ax.set(title=title, xlabel="range [m]", ylim=(-0.4, 2.6), yticks=[])
-    ax.set_xticks([0.2, 0.5, 1, 2, 5, 10, 30, 80], ["0.2", "0.5", "1", "2", "5", "10", "30", "80"])
-    ax.minorticks_off()
-
-
-# -- what each effect does ------------------------------------------------------------------------
+def draw(path: Path) -> None:
+    """Write it as a PNG with a palette: of few colours, a third of the bytes."""
+    save(_ablation(), path)
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(64, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
 
 
 def _ablation() -> Figure:

@@ -5,20 +5,17 @@ from __future__ import annotations
 
 import math
 from collections.abc import Iterator, Sequence
-from dataclasses import dataclass, field, replace
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
-from numpy.typing import NDArray
 
 from sim.driving.pilot import Pilot
 from sim.gym.goals import Ground
 from sim.sensors.lidar.models.lms221 import SCAN_MODES
-from sim.sensors.lidar.receiver import ScanResult
 from sim.sensors.lidar.registry import DEFAULT, ScannerConfig, scanner_of
 from sim.simulation import Simulation, n_frames
 from slam.evaluation.scanner.card import ScannerCard, measure
-from slam.evaluation.scanner.edges import mixed_beams
 from slam.frames import Frame, LaserSpec, Odometry, Stream, StreamMetadata
 from slam.logs import open_log
 
@@ -48,56 +45,36 @@ def like(card: ScannerCard, scanner: str) -> str:
 
 def simulated_card(scanner: str) -> ScannerCard:
     """Of a simulated scanner, by name, in static scenes."""
-    return measure(simulated(scanner_of(scanner)).stream)
-
-
-@dataclass(frozen=True, kw_only=True)
-class Simulated:
-    """``stream``: everything at rest but the robot; ``mixed``: truth, (n,) a scan of it."""
-
-    stream: Stream
-    mixed: list[NDArray[np.bool_]] = field(default_factory=list)
-
-    def between_that_mix(self) -> tuple[int, int]:
-        """Of beams with a range between two sides: how many mix two surfaces; how many."""
-        mix = beams = 0
-        for frame, mixed in zip(self.stream, self.mixed, strict=True):
-            assert frame.scan is not None
-            found = mixed_beams(np.where(frame.scan.valid, frame.scan.ranges, np.nan))
-            mix, beams = mix + int(mixed[found].sum()), beams + len(found)
-        return mix, beams
+    return measure(simulated(scanner_of(scanner)))
 
 
 def simulated(
     scanner: ScannerConfig, *, scenes: tuple[str, ...] = SCENES, places: int = PLACES,
     driven_s: float = DRIVEN_S,
-) -> Simulated:  # fmt: skip
-    """Scans of ``scanner`` in static scenes; the odometry of the frames is the truth."""
+) -> Stream:  # fmt: skip
+    """Scans of ``scanner`` where all but the robot rests; the odometry of the frames is the truth.
+
+    The robot stands at random ``places`` of each scene, and then drives.
+    """
     frames: list[Frame] = []
-    mixed: list[NDArray[np.bool_]] = []
     spec: LaserSpec | None = None
     for number, scene in enumerate(scenes):
         simulation = Simulation(
             scene, seed=SEED + number, dynamism=0.0, laser=scanner, odometry="ideal"
         )
         spec = spec or simulation.spec
-        rng = np.random.default_rng([SEED, number])
-        for result in _scans(simulation, rng, places, driven_s):
-            frame = simulation.frame
-            assert frame is not None
+        for frame in _scans(simulation, np.random.default_rng([SEED, number]), places, driven_s):
             assert frame.scan is not None
             assert frame.truth is not None
             wheels = Odometry(stamp_ns=frame.stamp_ns, T_odom_robot=frame.truth)
             frames.append(replace(frame, odometry=wheels, scan=replace(frame.scan, spec=spec)))
-            mixed.append(result.mixed)
     metadata = StreamMetadata(source="simulation", laser=spec)
-    stream = Stream(metadata=metadata, frames=lambda: frames, length=len(frames))
-    return Simulated(stream=stream, mixed=mixed)
+    return Stream(metadata=metadata, frames=lambda: frames, length=len(frames))
 
 
 def _scans(
     simulation: Simulation, rng: np.random.Generator, places: int, driven_s: float
-) -> Iterator[ScanResult]:
+) -> Iterator[Frame]:
     """First the places, then the tour from where it began."""
     world, period_s = simulation.world, simulation.scan_period_s
     ground, start = Ground(world), world.robot_pose()
@@ -106,11 +83,11 @@ def _scans(
         world.carry((x, y, float(rng.uniform(-math.pi, math.pi))))
         simulation.sense()  # begun before the robot was carried
         for _ in range(STANDING):
-            yield simulation.sense()
+            yield simulation.observe()
     world.carry(start)
     pilot, every = Pilot(world), max(1, round(1.0 / (RATE_HZ * period_s)))
     for number in range(n_frames(driven_s, period_s)):
         world.set_command(*pilot.command(period_s))
-        result = simulation.sense()
+        frame = simulation.observe()
         if number % every == 0:
-            yield result
+            yield frame

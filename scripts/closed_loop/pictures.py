@@ -14,6 +14,7 @@ from matplotlib.lines import Line2D
 
 import scenes
 from scenes.scene import Scene
+from scripts import figures
 from scripts.closed_loop.runs import Driven
 from scripts.figures import COLORS, color_of, save, styled
 from sim.view.draw import Picture
@@ -24,54 +25,35 @@ from slam.frames import Float
 Row = dict[str, Any]
 PX_PER_M = 40
 PALE = 0.35  # of the colour of what can move
-ASIDE = 0.05  # of the level's axis beyond its first and last point
 MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
 
 
-@styled({"axes.grid": False})
+@styled()
 def curves(path: Path, levels: Sequence[Row], axis: str = "dynamism") -> None:
     """``closed_loop.png``: a panel each for success and precision, with 95 % intervals."""
+    scene, names = levels[0]["scene"], list(dict.fromkeys(row["slam"] for row in levels))
+    ticks = sorted({row["dynamism"] for row in levels})
     figure = Figure(figsize=(10.0, 4.2))
-    success, precision = figure.subplots(1, 2)
-    names = list(dict.fromkeys(row["slam"] for row in levels))
-    for k, name in enumerate(names):
-        rows = [row for row in levels if row["slam"] == name]
-        aside = 0.008 * (k - 0.5 * (len(names) - 1))  # so that intervals do not cover each other
-        look = {"color": color_of(name, names), "marker": "o", "ms": 4, "capsize": 3, "lw": 1.4}
-        _line(success, rows, aside, ("success", "success_low", "success_high"), 100.0, name, look)
-        arrived = [row for row in rows if row["precision_m"] is not None]
-        columns = ("precision_m", "precision_m_low", "precision_m_high")
-        _line(precision, arrived, aside, columns, 1.0, name, look)
-    scene = levels[0]["scene"]
-    success.set(ylim=(-3, 103), ylabel="goals reached, %", title=f"{scene}: success, 95 % interval")
-    precision.set(
-        ylim=(0.0, None), ylabel="distance to the goal when believed reached, m",
-        title=f"{scene}: median precision, 95 % interval",
-    )  # fmt: skip
-    for ax in (success, precision):
-        ticks = sorted({row["dynamism"] for row in levels})
-        ax.set(xlabel=axis, xticks=ticks, xlim=(ticks[0] - ASIDE, ticks[-1] + ASIDE))
-        ax.grid(alpha=0.35)
-    handles, labels = success.get_legend_handles_labels()
+    panels = (
+        ("success", "goals reached, %", 100.0, 103.0),
+        ("precision_m", "distance to the goal when believed reached, m", 1.0, None),
+    )
+    for ax, (key, label, factor, top) in zip(figure.subplots(1, 2), panels, strict=True):
+        for name in names:
+            points = [
+                (row["dynamism"] + figures.apart(name, names, ticks),
+                 *(factor * row[f"{key}{end}"] for end in ("", "_low", "_high")))
+                for row in levels
+                if row["slam"] == name and row[key] is not None
+            ]  # fmt: skip
+            figures.line(ax, points, color_of(name, names), figures.marker(name, names), name)
+        figures.level_axis(ax, ticks, axis)
+        ax.set(ylim=(0.0, top), ylabel=label, title=f"{scene}: with 95 % intervals")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
     figure.legend(
         handles, labels, loc="outside upper center", ncols=len(names), frameon=False, fontsize=9
     )
     save(figure, path)
-
-
-def _line(  # noqa: PLR0913 (a curve and its style)
-    ax: Axes,
-    rows: Sequence[Row],
-    aside: float,
-    columns: tuple[str, str, str],
-    scale: float,
-    name: str,
-    look: dict[str, Any],
-) -> None:
-    at = np.array([row["dynamism"] for row in rows]) + aside
-    middle, low, high = (scale * np.array([row[c] for row in rows], float) for c in columns)
-    spread = np.maximum(np.array([middle - low, high - middle]), 0.0)
-    ax.errorbar(at, middle, yerr=spread, label=name, **look)
 
 
 @styled({"axes.grid": False})
@@ -107,11 +89,11 @@ def _room(view: MapView, poses: Float) -> Picture:
 
 def _panel(ax: Axes, run: Driven, room: Any, plan: MapView, scene: Scene) -> None:
     ax.imshow(room, interpolation="antialiased", alpha=0.75)
-    for name, style in (("believed", ":"), ("true", "-")):
+    for name, dashes in (("believed", ":"), ("true", "-")):
         if len(run.arrays[name]):
             pixels = plan.to_pixels(run.arrays[name][:, :2].copy())
             color = "#1f61be" if name == "believed" else COLORS["truth"]
-            ax.plot(pixels[:, 0], pixels[:, 1], style, color=color, lw=1.2)
+            ax.plot(pixels[:, 0], pixels[:, 1], dashes, color=color, lw=1.2)
     for k, goal in enumerate(run.goals):
         place = np.array([scene.goals[goal["goal"]]], dtype=np.float64)
         x, y = plan.to_pixels(place)[0].tolist()

@@ -37,7 +37,7 @@ class Plan(Asked):
     loop: LoopConfig = field(default_factory=LoopConfig)
 
     def __post_init__(self) -> None:
-        self.room(0.0)  # complains of an axis that cannot be
+        self.levels_of.at(0.0)  # complains of an axis that cannot be
         self.check_each_once("slams", "levels", "seeds")
         if any(not 0.0 <= level <= 1.0 for level in self.levels):
             raise InvalidValueError(f"--{self.axis} must lie in [0, 1], got {self.levels}")
@@ -57,7 +57,7 @@ class Plan(Asked):
                     yield dict(zip(IDENTITY, identity, strict=True)), self._job(level, seed, name)
 
     def _job(self, level: float, seed: int, name: str) -> Job:
-        room = self.room(level) | options_with(self.crowd)
+        room = self.levels_of.at(level) | options_with(self.crowd)
         goals = list(self.goals) if isinstance(self.goals, tuple) else self.goals
         run = Run(scene=self.scene, dynamism=level, seed=seed, axis=self.axis)
         return Job(

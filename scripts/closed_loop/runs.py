@@ -12,8 +12,7 @@ from typing import Any
 import numpy as np
 
 from sim.loop import GoalResult, LoopConfig, LoopRun, closed_loop
-from sim.loop.referee import Tally
-from sim.loop.run import goal_order
+from sim.loop.run import Tally, goal_order
 from sim.simulation import Simulation
 from slam.archives import read_arrays
 from slam.errors import LogFormatError, SlamFailedError

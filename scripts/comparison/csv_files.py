@@ -13,9 +13,8 @@ from typing import Any
 from scripts.comparison.rules import Table
 from sim.recording.sums import check_vouched
 from slam.bounded import text_of
-from slam.csv_cells import cell_of
 from slam.errors import InvalidValueError, LogFormatError
-from slam.files import write_text
+from slam.files import cell_of, write_text
 
 MAX_BYTES = 1 << 29  # of a table: half a million rows of runs.csv
 Row = dict[str, Any]

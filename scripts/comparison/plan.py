@@ -4,13 +4,15 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, replace
+from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import scenes
 import sim
 import slam
+from scenes import is_file
+from scenes.scene_file import sha256_of
 from scripts.comparison import entry, recording
 from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import LATER, settings
@@ -23,6 +25,7 @@ from sim.simulation import n_frames
 from sim.world.times_of_day import MOST_SESSIONS
 from slam.errors import InvalidValueError
 from slam.guests import Limits
+from slam.names import NameFromFile
 
 RECORDINGS, ENTRIES = "recordings", "entries"
 MAX_RUNS = 100_000
@@ -70,10 +73,11 @@ class Asked:
     change: float | None = None
     crowd: str | None = None
 
-    def room(self, level: float) -> dict[str, Any]:
-        """``dynamism``, ``motion`` and ``change`` at a level; errors for an axis that is none."""
+    @property
+    def levels_of(self) -> Axis:
+        """What the levels are of; errors for an axis that is none."""
         held = Held(motion=self.motion, change=self.change, crowd=self.crowd)
-        return Axis(name=self.axis, held=held).at(level)
+        return Axis(name=self.axis, held=held)
 
     def check_each_once(self, *names: str) -> None:
         """``InvalidValueError`` for a field that names nothing, or something twice."""
@@ -97,6 +101,7 @@ class Plan(Asked):
              as the SLAM does
     sessions  of a building beside each run, in whose map SLAMs live from session to session
              (``scripts.days.buildings``); None: no buildings
+    scene_sha256  of scenes by their files; found where the names are not from a file themselves
     """
 
     scenes: tuple[str, ...]
@@ -107,8 +112,12 @@ class Plan(Asked):
     sets: tuple[Mapping[str, Any], ...] = ()
     judge_maps: bool = True
     sessions: int | None = None
+    scene_sha256: Mapping[str, str] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        typed = [s for s in self.scenes if is_file(s) and not isinstance(s, NameFromFile)]
+        found = {scene: sha256_of(scene) for scene in typed if scene not in self.scene_sha256}
+        object.__setattr__(self, "scene_sha256", {**self.scene_sha256, **found})
         Limits(scan_s=self.scan_limit_s)
         self._check_axis()
         self.check_each_once("slams", "scenes", "levels", "seeds")
@@ -128,7 +137,7 @@ class Plan(Asked):
 
     def _check_axis(self) -> None:
         if self.axis != LEVEL:
-            self.room(0.0)  # complains of an axis that cannot be
+            self.levels_of.at(0.0)  # complains of an axis that cannot be
         elif (self.motion, self.change, self.crowd) != (None, None, None):
             raise InvalidValueError("Plan: with axis 'level' the levels set motion, change, crowd")
         fits = len(self.sets) == (len(self.levels) if self.axis == LEVEL else 0)
@@ -157,8 +166,9 @@ class Plan(Asked):
             )
 
     def settings(self) -> dict[str, Any]:
-        """For a recipe; without ``sessions`` where there are none, as it was before these."""
-        return {k: v for k, v in asdict(self).items() if k != "sessions" or v is not None}
+        """For a recipe; without what later came where there is none of it, as it was before."""
+        later = ("sessions", "scene_sha256")
+        return {k: v for k, v in asdict(self).items() if k not in later or v}
 
     def runs(self) -> list[Run]:
         """Every simulated run, scene by scene, level by level."""
@@ -176,10 +186,12 @@ class Plan(Asked):
             own = {"dynamism": 0.0, **{k: v for k, v in given.items() if k in _OF_RECIPE}}
             options = {k: v for k, v in given.items() if k not in _OF_RECIPE}
         else:
-            own, options = self.room(run.dynamism), options_with(self.crowd)
+            axis = self.levels_of
+            own, options = axis.at(run.dynamism), options_with(axis.crowd(run.dynamism))
         return Recipe(
             scene=run.scene, seed=run.seed, **own, seconds=self.seconds, scanner=self.scanner,
             odometry=self.odometry, options=options,
+            scene_sha256=self.scene_sha256.get(run.scene),
         )  # fmt: skip
 
     def recordings(self) -> dict[str, Job]:

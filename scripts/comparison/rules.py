@@ -14,9 +14,10 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
+from scripts.options import MOST_PEOPLE, PEOPLE
 from slam.checked import is_number, is_whole
-from slam.csv_cells import word_of
 from slam.errors import LogFormatError
+from slam.files import word_of
 
 MOST = 1e100  # of a finite number, either way: its squares and their sums are finite too
 MAX_WORD = 2000  # letters of a name: what is longer is the name of no file
@@ -141,6 +142,8 @@ LEVEL = "level"  # the axis of ``scripts.comparison.plan.Plan.sets``
 
 def level_of(axis: str) -> Rule:
     """What a level of that axis may be."""
+    if axis == PEOPLE:
+        return number(most=MOST_PEOPLE)
     return number(least=-1e6, most=1e6) if axis == LEVEL else SHARE
 
 

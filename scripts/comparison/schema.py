@@ -133,6 +133,7 @@ LATER: Mapping[str, Rule] = {
     "axis": word(among=(*AXES, LEVEL)), "motion": _MAYBE_SHARE, "change": _MAYBE_SHARE,
     "crowd": word(optional=True), "odometry": _NAME, "sets": PLAIN, "judge_maps": TRUTH,
     "sessions": number(least=2.0, most=MOST_SESSIONS, whole=True, optional=True),
+    "scene_sha256": named({}, others=word()),
 }  # fmt: skip
 """Settings that recipes of before did not have."""
 RECIPE: Mapping[str, Rule] = {

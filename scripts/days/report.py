@@ -25,8 +25,8 @@ from scripts.pages.page import Part
 from sim.recording.tables import table
 from slam.days.changes import Change, between
 from slam.days.evidence import Snapshot
+from slam.days.habits import MobilityMap
 from slam.days.history import DAY_S, dense
-from slam.days.mobility import MobilityMap
 from slam.days.session import read_history
 from slam.estimate import Raster
 from slam.files import write_text

@@ -15,7 +15,6 @@ from rich.table import Table
 from scripts.console import plain_table
 from scripts.days.ages import COLUMNS as AGE_COLUMNS
 from scripts.days.lifelong import COLUMNS
-from scripts.days.scores import counts, first_words
 from sim.recording.tables import table
 from slam.files import write_text
 
@@ -56,29 +55,6 @@ def printed(slam: str, rows: Sequence[Row], *, whole: bool = False) -> Table:
         cells["map"] = _APART.sub(r"apart \1", cells["map"])
         found.add_row(*map(escape, cells.values()))
     return found
-
-
-def verdict(rows: Sequence[Row], failure: str | None = None) -> str:
-    """How many sessions were found, whether the last is as good as the first, and ``failure``:
-    what the SLAM said when it first failed.
-    """
-    failed = sum(row["place"] == "failed" for row in rows)
-    end = f"; failed in {failed} of {len(rows)} sessions" if failed else ""
-    end += f", first: `{first_words(failure)}`" if failure else ""
-    if all(row["map"] == "anew" for row in rows):
-        return "cannot load a map: every session starts anew, in a frame of its own" + end
-    later = [row for row in rows if row["map"] != "new"]
-    of = counts(later)
-    text = (
-        f"{of['found']} of {of['to_find']} sessions found, {of['found_soon']} within 10 s, "
-        f"{of['wrong']} at a wrong place"
-    )
-    if of["known"] < of["to_find"]:
-        text += f"; {of['to_find'] - of['known']} began where no session before had been"
-    measured = [row["rmse_m"] for row in rows if row["rmse_m"] is not None]
-    if len(measured) > 1 and measured[0]:
-        text += f"; error of the last session {measured[-1] / measured[0]:.2f} of the first's"
-    return text + end
 
 
 def last_session(rows: Sequence[Row], changed: str) -> str:

@@ -19,7 +19,7 @@ from scripts.debugger.question import Question
 from scripts.debugger.recording import Checkpoint, Pair, Sighting, Strip, Tape, row_at, sightings
 from sim.twins.absence import Change
 from slam.errors import SlamFailedError
-from slam.evaluation.divergence import Divergence, first_divergence, largest_rise_m
+from slam.evaluation.lost import Divergence, first_divergence, largest_rise_m
 from slam.frames import Float
 
 CURED = 0.5

@@ -56,6 +56,7 @@ class Case:
         """The world in a line."""
         options = {k: v for k, v in self.settings.items() if isinstance(v, str | int | float)}
         scene = options.pop("scene", "?")
+        options.pop("scene_sha256", None)
         return " · ".join([str(scene), *(f"{k} {v}" for k, v in sorted(options.items()))])
 
 

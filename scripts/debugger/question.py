@@ -8,7 +8,7 @@ from dataclasses import dataclass, field
 
 from scripts.options import whole
 from slam.errors import InvalidValueError
-from slam.evaluation.divergence import Rule
+from slam.evaluation.lost import Rule
 
 
 @dataclass(frozen=True, kw_only=True)

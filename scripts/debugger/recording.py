@@ -24,9 +24,9 @@ from sim.twins import absence
 from sim.twins.absence import Change
 from slam import se2
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
-from slam.evaluation.divergence import errors_since_m
+from slam.evaluation.lost import errors_since_m
 from slam.frames import Float, Frame
-from slam.frontend.odometry_sum import MotionSum
+from slam.frontend.odometry_steps import MotionSum
 from slam.oracle import shown
 from slam.replay import Track
 from slam.system import create

@@ -8,12 +8,12 @@ import platform
 import shutil
 import sys
 from collections.abc import Callable, Iterator
+from contextlib import suppress
 from dataclasses import dataclass
 from importlib import metadata
 from pathlib import Path
-from typing import Any, Literal
+from typing import Literal
 
-from packaging.markers import default_environment
 from packaging.requirements import Requirement
 
 import mobilia
@@ -28,7 +28,7 @@ LEAST_FREE_GB = 1.0  # in the working folder: a dataset of an hour, or the films
 EXTRAS = {  # what each is for; how to get them follows from their names
     "guests": "SLAMs of others to compare with",
     "yag": "YAG SLAM",
-    "rl": "scripts.experiments.train_policy",
+    "rl": "training policies (sim.gym.learning)",
     "ros2": "nodes of ROS 2 over DDS and Zenoh",
     "cluster": "--cluster",
 }
@@ -96,22 +96,10 @@ def required(extra: str | None = None) -> list[Requirement]:
     found = []
     for one in map(Requirement, words):
         of_extra = one.marker is not None and "extra" in str(one.marker)
-        if of_extra == (extra is not None) and _applies(one, extra or ""):
+        applies = one.marker is None or one.marker.evaluate({"extra": extra or ""})
+        if of_extra == (extra is not None) and applies:
             found.append(one)
     return found
-
-
-def _provided() -> list[str]:
-    """The extras that the installed mobilia has."""
-    try:
-        return metadata.metadata(PACKAGE).get_all("Provides-Extra") or []
-    except metadata.PackageNotFoundError:
-        return []
-
-
-def _applies(one: Requirement, extra: str) -> bool:
-    environment: dict[str, Any] = {**default_environment(), "extra": extra}
-    return one.marker is None or one.marker.evaluate(environment)
 
 
 def wrong_with(one: Requirement) -> str:
@@ -163,19 +151,13 @@ def _machine() -> Iterator[Finding]:
     yield _usable("cache of compiled loops", writable, told, how)
     landlock = kernel_version()
     how = "Linux 5.13 or newer, with landlock in /sys/kernel/security/lsm"
-    yield _usable("guests see no truth (Landlock)", landlock, _kept_off(landlock), how)
+    told = f"version {landlock}" + ": it can empty files, not read them" * (landlock < WHOLE)
+    told = told if landlock else "a program behind pipe: sees all your files"
+    yield _usable("guests see no truth (Landlock)", landlock, told, how)
     free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
     how = "outputs go to --out: name a folder on another disk"
     enough = free_gb >= LEAST_FREE_GB
     yield _usable("disk, working folder", enough, f"{free_gb:.1f} GB free", how)
-
-
-def _kept_off(landlock: int) -> str:
-    if not landlock:
-        return "a program behind pipe: sees all your files"
-    return f"version {landlock}" + (
-        "" if landlock >= WHOLE else ": it can empty files, not read them"
-    )
 
 
 def cores() -> int:
@@ -199,7 +181,9 @@ def _there(folder: Path) -> Path:
 
 
 def _extras() -> Iterator[Finding]:
-    known = _provided()
+    known: list[str] = []
+    with suppress(metadata.PackageNotFoundError):
+        known = metadata.metadata(PACKAGE).get_all("Provides-Extra") or []
     for extra, used_for in EXTRAS.items():
         wanted = required(extra)
         lacking = [one.name for one in wanted if wrong_with(one)]

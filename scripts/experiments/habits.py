@@ -32,8 +32,15 @@ from sim.core.seeds import Seeds
 from sim.world.sessions import Days
 from sim.world.times_of_day import clock_s
 from slam.days.habits import Habits
-from slam.days.predictions import Predictor, brier, log_score
-from slam.days.rivals import FreMEn, LastSeen, Mean, PersistenceFilter
+from slam.days.predictions import (
+    FreMEn,
+    LastSeen,
+    Mean,
+    PersistenceFilter,
+    Predictor,
+    brier,
+    log_score,
+)
 from slam.evaluation.statistics import bootstrap_draws, central_interval
 from slam.frames import Float
 

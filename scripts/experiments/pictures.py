@@ -74,6 +74,8 @@ _TRACK_SHOTS: dict[str, dict[str, Any]] = {
     "rush-hour": {"from_s": 12.0, "far_m": 16.0, "down_deg": 40.0},
     "busy-chairs": {"view": "top"},
     "moving-boards": {"from_s": 8.0, "far_m": 11.0},
+    "slow-boards": {"from_s": 20.0, "far_m": 11.0},
+    "half-turn": {"from_s": 8.0, "view": "top"},
     "moving-day": {"from_s": 40.0, "view": "top"},
     "overnight": {"from_s": 54.0, "view": "top"},
     "kidnapped-in-a-crowd": {"from_s": 54.0, "view": "top"},
@@ -106,7 +108,7 @@ def clips() -> dict[str, Shot]:
         recipe = plan.recipe(plan.runs()[-1])
         settings = {**recipe.simulation(), "laser": LASER, "labels": False}
         own = {"from_s": 6.0, **_TRACK_SHOTS.get(family, {})}
-        found[f"track_{track.name}"] = Shot(settings=settings, **own)
+        found[f"track_{family}"] = Shot(settings=settings, **own)
     for name in scenes.names():
         settings = {"scene": name, "seed": SCENE_SEED, "dynamism": 1.0, "laser": LASER}
         found[f"scene_{name}"] = Shot(settings=settings, from_s=2.0, view="persp")

@@ -14,11 +14,10 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from scripts.card import beside
-from scripts.card.real import real_card, simulated
+from scripts.card.real import real_card, simulated_card
 from scripts.marks import fill_page
-from sim.sensors.lidar.registry import scanner_of
 from slam.errors import MobiliaError
-from slam.evaluation.scanner.card import ScannerCard, measure
+from slam.evaluation.scanner.card import ScannerCard
 
 ROOT = Path(__file__).resolve().parents[2]
 PAGE, PICTURE = "docs/real_scanner.md", "docs/pictures/real_scanner.png"
@@ -41,19 +40,9 @@ def real_cards(data: Path, logs: Mapping[str, tuple[str, ...]]) -> Cards:
     return {name: real_card([data / path for path in paths]) for name, paths in logs.items()}
 
 
-def our_cards(scanners: Mapping[str, str]) -> tuple[Cards, list[str]]:
-    """One card a name, and a line for each about the ranges between two sides."""
-    cards, said = {}, []
-    for name, scanner in scanners.items():
-        made = simulated(scanner_of(scanner))
-        cards[name] = measure(made.stream)
-        mix, beams = made.between_that_mix()
-        share = f"{100.0 * mix / beams:.0f} %" if beams else "none"
-        said.append(
-            f"- `{scanner}`: of {beams} ranges between two sides, {share} are mixed pixels by the "
-            "simulator's truth; the others are of thin things that stand there."
-        )
-    return cards, said
+def our_cards(scanners: Mapping[str, str]) -> Cards:
+    """One card a name."""
+    return {name: simulated_card(scanner) for name, scanner in scanners.items()}
 
 
 def main(arguments: Sequence[str] | None = None) -> int:
@@ -67,12 +56,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
         parser.error("--data is missing, and MOBILIA_DATA is not set")
     try:
         one, half = real_cards(wanted.data, LOGS_1_DEG), real_cards(wanted.data, LOGS_HALF_DEG)
-        ours_one, said = our_cards(OURS_1_DEG)
-        ours_half, said_half = our_cards(OURS_HALF_DEG)
+        ours_one, ours_half = our_cards(OURS_1_DEG), our_cards(OURS_HALF_DEG)
         page = wanted.root / PAGE
         fill_page(page, "one-degree", "\n".join(beside.markdown(one, ours_one)))
         fill_page(page, "half-degree", "\n".join(beside.markdown(half, ours_half)))
-        fill_page(page, "between", "\n".join([*said, *said_half]))
         beside.draw(wanted.root / PICTURE, {**one, **half}, {**ours_one, **ours_half})
     except MobiliaError as error:
         print(f"real_scanner: {error}", file=sys.stderr)

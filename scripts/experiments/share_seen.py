@@ -15,7 +15,6 @@ from __future__ import annotations
 
 import math
 import sys
-import time
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
@@ -35,7 +34,6 @@ from slam.frames import NS_PER_S, BeamClass, Float, Frame
 SCANNER = "scanner(fov_deg=180,beams=181,rate_hz=5,sigma_m=0.01)"
 MOVED_M = 0.1  # farther from where it was seen last, a thing stands elsewhere
 LEAST_BEAMS = 2  # that meet a thing, for it to be in view
-WARM_SCANS = 5  # before the processor's time counts: code is being loaded
 
 
 class Resightings:
@@ -72,19 +70,16 @@ class Resightings:
 
 
 def measure(case: Row) -> Row:
-    """One run's row: shares of 1, m, s; ``real_time_factor`` is of this machine."""
+    """One run's row: shares of 1, m, s."""
     settings: dict[str, Any] = Axis(name=case["axis"]).at(case["level"])
     simulation = Simulation(
         case["scene"], seed=case["seed"], laser=case["scanner"], labels=True, **settings
     )
     world, period_s = simulation.world, simulation.scan_period_s
     pilot, resightings = Pilot(world), Resightings(world, case["away"])
-    count, began_s = n_frames(case["seconds"], period_s), 0.0
+    count = n_frames(case["seconds"], period_s)
     kinds, way = np.zeros((count, len(BeamClass)), dtype=np.int64), np.zeros((count, 2))
     for k in range(count):
-        if k == min(WARM_SCANS, count - 1):
-            began_s = time.process_time()
-            timed_s = (count - k) * period_s
         world.set_command(*pilot.command(period_s))
         frame = simulation.observe()
         assert frame.labels is not None
@@ -92,7 +87,6 @@ def measure(case: Row) -> Row:
         kinds[k] = np.bincount(frame.labels.kind, minlength=len(BeamClass))
         way[k] = frame.truth[:2]
         resightings.look(frame)
-    spent_s = time.process_time() - began_s
     walked, blocked = (float(seconds.sum()) for seconds in world.people.walked_s())
     again = resightings.again
     return {
@@ -102,7 +96,6 @@ def measure(case: Row) -> Row:
         "blocked": blocked / walked if walked > 0.0 else 0.0,
         "goals": pilot.driver.visited,
         "driven_m": float(np.sqrt((np.diff(way, axis=0) ** 2).sum(axis=1)).sum()),
-        "real_time_factor": timed_s / max(spent_s, 1e-9),
     }
 
 

@@ -19,7 +19,7 @@ from scripts.metrics.judged import Judged, world_truth
 from scripts.metrics.table import METRICS
 from slam.evaluation import lost
 from slam.frames import NS_PER_S, Frame
-from slam.frontend.odometry_sum import MotionSum
+from slam.frontend.odometry_steps import MotionSum
 from slam.replay import Track
 from slam.system import create
 from slam.trajectory import Trajectory

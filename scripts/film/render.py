@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import AbstractContextManager, nullcontext
 
 from rich.markup import escape
 
@@ -18,28 +17,19 @@ from slam.errors import InvalidValueError
 from slam.frames import BeamClass, Frame, Stream
 
 
-def shoot(
-    stream: Stream,
-    show: Show,
-    reel: Film | None,
-    filming: Callable[[], AbstractContextManager[None]] = nullcontext,
-) -> Iterator[Frame]:
-    """Replay ``stream`` until the film ends, yield each frame once it is noted and filmed.
-
-    ``filming`` is entered while pictures are made.
-    """
+def shoot(stream: Stream, show: Show, reel: Film | None) -> Iterator[Frame]:
+    """Replay ``stream`` until the film ends, yield each frame once it is noted and filmed."""
     taken = 0
     for frame in show.replay.run(stream):
         seconds = show.note(frame).seconds
         due = show.pace.due(seconds) - taken if reel is not None else 0
         over = seconds > show.pace.to_s
         if reel is not None and due > 0:
-            with filming():
-                before = reel.last if reel.last is not None else show.paint(frame)
-                for _ in range(due if over else due - 1):  # until now the world looked as before
-                    reel.add(before)
-                if not over:
-                    reel.add(show.paint(frame))
+            before = reel.last if reel.last is not None else show.paint(frame)
+            for _ in range(due if over else due - 1):  # until now the world looked as before
+                reel.add(before)
+            if not over:
+                reel.add(show.paint(frame))
             taken += due
         if over:
             return

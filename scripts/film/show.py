@@ -93,7 +93,7 @@ class Show:
         names = {name: name for name in self.replay.tracks}
         if self.shown is not None and self.shown.truth_map is not None and self.truth_name:
             names["truth"] = self.truth_name
-        return [(word, self.colors[name]) for name, word in names.items()]
+        return [(_short(word), self.colors[name]) for name, word in names.items()]
 
     def legend(self) -> list[tuple[str, Color]]:
         """The same for a strip, with what the colours of the beams say."""
@@ -271,12 +271,12 @@ class _Panes:
         unit, (width, height) = layout.unit, layout.size
         canvas: Picture = np.full((height, width, 3), draw.PAPER, np.uint8)
         size = round(17 * unit)
-        words = f"{show.title} · {show.primary}"
+        words = f"{show.title} · {_short(show.primary)}"
         x = draw.text(canvas, words, (round(16 * unit), round(12 * unit)), size, bold=True)
         self._time_x = x + round(24 * unit)
         self._key(canvas)
         titles = [
-            (layout.map, f"map of {show.primary}: {self._holds()}scan, trails"),
+            (layout.map, f"map of {_short(show.primary)}: {self._holds()}scan, trails"),
             (layout.close, f"close-up, {SIGMAS:g} σ ellipse"),
         ]
         titles += list(zip(layout.more, self._more, strict=True))
@@ -315,6 +315,11 @@ class _Panes:
             bar, y = round(18 * unit), round(21 * unit)
             canvas[y : y + round(3 * unit), x - bar - round(6 * unit) : x - round(6 * unit)] = color
             x -= bar + round(24 * unit)
+
+
+def _short(word: str) -> str:
+    """Of a long command, its two ends."""
+    return word if len(word) <= 28 else f"{word[:10]}…{word[-12:]}"
 
 
 def _put(canvas: Picture, box: Box, picture: Picture) -> None:

@@ -19,9 +19,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scripts.experiments.kidnap import kidnapped, targets
 from scripts.experiments.measured import ended
 from scripts.figures import COLORS, save, styled
+from scripts.integrity.kidnap import kidnapped, targets
 from scripts.integrity.labelled import off
 from scripts.integrity.plane import StreamSpec, frames
 from scripts.integrity.reliability import believed

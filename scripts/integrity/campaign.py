@@ -40,8 +40,10 @@ PLANE = tuple(
 )
 CODE = (
     ROOT / "slam", *PLANE, ROOT / "scripts" / "metrics",
-    *(ROOT / "scripts" / "integrity" / f"{name}.py" for name in ("counting", "losses", "ways")),
-    *(ROOT / "scripts" / "experiments" / f"{name}.py" for name in ("kidnap", "honesty")),
+    *(
+        ROOT / "scripts" / "integrity" / f"{name}.py"
+        for name in ("counting", "kidnap", "losses", "ways")
+    ),
 )  # fmt: skip
 """What a case depends on."""
 

@@ -20,7 +20,7 @@ import numpy as np
 import scipy  # scipy.stats comes with its first use
 from numpy.typing import NDArray
 
-from scripts.experiments.kidnap import RIGHT_M, RIGHT_RAD
+from scripts.integrity.kidnap import RIGHT_M, RIGHT_RAD
 from scripts.metrics.judged import SILENT_M, Judged
 from slam.errors import InvalidValueError
 from slam.evaluation.statistics import CONFIDENCE

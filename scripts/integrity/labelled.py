@@ -17,7 +17,7 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
-from scripts.experiments.kidnap import kidnapped, targets
+from scripts.integrity.kidnap import kidnapped, targets
 from slam import se2
 from slam.frames import NS_PER_S, Float, Frame
 from slam.frontend.observations import Observations, observe

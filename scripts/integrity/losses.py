@@ -12,9 +12,17 @@ from typing import Any
 
 import numpy as np
 
-from scripts.experiments.kidnap import AFTER_S, kidnapped, scans_after, targets
-from scripts.experiments.pushes import BACK_DEG, BACK_M, KINDS, push
 from scripts.integrity.counting import Moments, binned, stretches
+from scripts.integrity.kidnap import (
+    AFTER_S,
+    BACK_DEG,
+    BACK_M,
+    KINDS,
+    kidnapped,
+    push,
+    scans_after,
+    targets,
+)  # fmt: skip
 from scripts.integrity.plane import frames
 from scripts.integrity.ways import EACH, WAYS, Case
 from scripts.metrics.judged import Judged, world_truth

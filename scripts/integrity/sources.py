@@ -31,8 +31,8 @@ LEVEL = 1.0  # of the tracks
 SECONDS = 150.0  # of a stream of the plane
 MOST_SCANS = 2000  # of a log
 CODE = (
-    ROOT / "slam", *PLANE, ROOT / "scripts" / "integrity" / "labelled.py",
-    ROOT / "scripts" / "experiments" / "kidnap.py",
+    ROOT / "slam", *PLANE,
+    *(ROOT / "scripts" / "integrity" / f"{name}.py" for name in ("kidnap", "labelled")),
 )  # fmt: skip
 Source = Stream | StreamSpec | Path
 """A track, a stream of the plane, or the log of a real robot."""

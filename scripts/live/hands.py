@@ -38,12 +38,12 @@ class Hands:
             self._world.set_command(*self._steer(pilot.command(period_s)))
             yield observed(self.simulation)
 
-    def _steer(self, tour: tuple[float, float]) -> tuple[float, float]:
+    def _steer(self, tour: tuple[float, float]) -> tuple[float, ...]:
         if not self.client_drives:
             return tour
         if self._world.time_ns - self._asked_ns > HOLD_NS:
             return 0.0, 0.0
-        return self._twist.v, self._twist.omega
+        return self._twist.v, self._twist.omega, self._twist.side
 
     def do(self, request: OnWorld) -> str:
         """Do it to the world as it is now; what was done, in words.
@@ -51,6 +51,7 @@ class Hands:
         Raises a ``MobiliaError`` that says why it cannot be done.
         """
         if isinstance(request, Drive):
+            self._world.set_command(request.v, request.omega, request.side)  # or says why not
             self.client_drives = True
             self._twist, self._asked_ns = request, self._world.time_ns
             return "the robot takes twists"

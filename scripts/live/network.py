@@ -24,7 +24,9 @@ _OPEN = {"open": True, "shut": False}
 
 
 def _drive(message: Any) -> OnWorld:
-    return Drive(v=float(message.linear.x), omega=float(message.angular.z))
+    twist = getattr(message, "twist", message)  # of a TwistStamped
+    ahead, side = float(twist.linear.x), float(twist.linear.y)
+    return Drive(v=ahead, omega=float(twist.angular.z), side=side)
 
 
 def _carry(message: Any) -> OnWorld:
@@ -49,6 +51,7 @@ def _door(message: Any) -> OnWorld:
 
 TAKES = (
     (Topic(name="/cmd_vel", kind="geometry_msgs/msg/Twist"), _drive),
+    (Topic(name="/cmd_vel", kind="geometry_msgs/msg/TwistStamped"), _drive),  # newer stacks
     (Topic(name="/initialpose", kind="geometry_msgs/msg/PoseWithCovarianceStamped"), _carry),
     (Topic(name="/mobilia/push", kind=_STRING), _push),
     (Topic(name="/mobilia/door", kind=_STRING), _door),
@@ -58,11 +61,10 @@ SILENCE_S = 1.0  # between two complaints: a stream of bad messages does not flo
 
 
 class Network:
-    """One robot on ``link``, its scanner ``height_m`` up."""
+    """One robot on ``link``."""
 
-    def __init__(self, link: Link, *, height_m: float) -> None:
-        self._link = link
-        self._robot = Robot(link, height_m=height_m)
+    def __init__(self, link: Link) -> None:
+        self._link, self._robot = link, Robot(link)
         self._sent = -1
         self._refused: MobiliaError | None = None
         self._told_s = -SILENCE_S
@@ -75,11 +77,8 @@ class Network:
             self._sent = shown.number
             self._robot.send(shown.frame)
 
-    def begin(self, static_map: Raster | None, height_m: float | None = None) -> None:
-        """A run begins; what never moves in it goes out as /ground_truth/map.
-
-        height_m  of the scanner in it; None: as it was
-        """
+    def begin(self, static_map: Raster | None, height_m: float) -> None:
+        """A run begins; arguments of ``Robot.restart``."""
         self._sent = -1
         self._robot.restart(static_map, height_m)
 

@@ -17,12 +17,12 @@ from typing import Any
 
 import numpy as np
 
-from scripts.live.inbox import Inbox
 from scripts.live.playback import KEPT_S, Playback
 from scripts.live.requests import (
     Anew,
     Click,
     Drive,
+    Inbox,
     Request,
     Run,
     Seek,

@@ -1,19 +1,23 @@
 # SPDX-License-Identifier: Apache-2.0
 """Play, pause, step and seek: what is kept of the last minute, and which moment is shown.
 
-Nothing here knows what time it is: ``scripts.live.pace`` does.
+``Pace`` alone looks at the clock on the wall.
 """
 
 from __future__ import annotations
 
+import math
+import time
 from collections import deque
-from collections.abc import Iterator
+from collections.abc import Callable, Iterator
 
 from scripts.live.requests import OnView, Run, Speed, Step
 from sim.view.moment import Shown
 from slam.errors import MobiliaError
 
 KEPT_S = 60.0  # of the run, to look back
+LATE_S = 0.25  # behind by more than that it goes on from here instead of running after
+SENT_HZ = 40.0  # moments sent a second at most
 
 
 class Playback:
@@ -90,3 +94,39 @@ class Playback:
             wanted = self._kept[-1].seconds - request.back_s - 1e-6
             later = (k for k, moment in enumerate(self._kept) if moment.seconds >= wanted)
             self._at = next(later)
+
+
+class Pace:
+    """When the next moment is due, and whether it is to be sent.
+
+    clock  s, steady
+    """
+
+    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
+        self._clock = clock
+        self._wall_s = self._run_s = math.nan
+        self._speed = 1.0
+        self._sent_s = -math.inf
+
+    def restart(self) -> None:
+        """The next moment is due now."""
+        self._wall_s = math.nan
+
+    def wait_s(self, run_s: float, speed: float) -> float:
+        """s until the moment at ``run_s`` is due."""
+        now = self._clock()
+        if math.isnan(self._wall_s) or speed != self._speed or run_s < self._run_s:
+            self._wall_s, self._run_s, self._speed = now, run_s, speed
+            return 0.0
+        due = self._wall_s + (run_s - self._run_s) / speed
+        if now - due > LATE_S:
+            self._wall_s, self._run_s = now, run_s
+        return max(0.0, due - now)
+
+    def to_send(self) -> bool:
+        """Whether so much time has passed that a moment is to be sent again; then it has been."""
+        now = self._clock()
+        if now - self._sent_s < 1.0 / SENT_HZ - 0.002:
+            return False
+        self._sent_s = now
+        return True

@@ -1,16 +1,21 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a page may ask for: bounded and checked, whoever wrote it, and never run."""
+"""What a page may ask for: bounded and checked, whoever wrote it, and never run.
+
+With the queue in which it waits for the thread that owns the world.
+"""
 
 from __future__ import annotations
 
+import queue
 from dataclasses import dataclass, field, fields
 from typing import Any
 
 from scripts.live import FASTEST, SLOWEST
 from sim.core.checks import FAR_M, three, within, word
 from sim.world.requests import Kidnap, MoveDoor, Push
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, MobiliaError
 
+MOST_WAITING = 64  # requests; a client that sends more is told so
 MOST_TWIST = 1e3  # m/s and rad/s; the drive clips to what it can do
 
 
@@ -47,10 +52,11 @@ class _Checked:
 
 @dataclass(frozen=True, kw_only=True)
 class Drive(_Checked):
-    """Twist for the robot, m/s and rad/s."""
+    """Twist for the robot, m/s, rad/s, and m/s to the left."""
 
     v: float = _number(-MOST_TWIST, MOST_TWIST)
     omega: float = _number(-MOST_TWIST, MOST_TWIST)
+    side: float = _number(-MOST_TWIST, MOST_TWIST, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -114,3 +120,36 @@ class Anew(_Checked):
 OnWorld = Drive | Tour | Push | MoveDoor | Kidnap | Click
 OnView = Run | Step | Seek | Speed
 Request = OnWorld | OnView | Anew
+
+
+class Inbox:
+    """A queue of limited length. ``refused`` keeps the last thing that was wrong, to be told."""
+
+    def __init__(self) -> None:
+        self._queue: queue.Queue[Request] = queue.Queue(MOST_WAITING)
+        self._refused: str | None = None
+
+    def put(self, request: Request) -> None:
+        """Hand a request over; ``InvalidValueError`` where too many wait. From any thread."""
+        try:
+            self._queue.put_nowait(request)
+        except queue.Full:
+            raise InvalidValueError(
+                f"{MOST_WAITING} requests wait already: this one is dropped"
+            ) from None
+
+    def refuse(self, why: MobiliaError) -> None:
+        """Keep this to be told to the clients, in place of what was kept before."""
+        self._refused = str(why)[:300]
+
+    def refused(self) -> str | None:
+        """What is to be told, once."""
+        said, self._refused = self._refused, None
+        return said
+
+    def get(self, timeout_s: float) -> Request | None:
+        """The next request, None where none comes in that time."""
+        try:
+            return self._queue.get(timeout_s > 0.0, max(timeout_s, 0.0))
+        except queue.Empty:
+            return None

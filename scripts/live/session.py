@@ -1,13 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run as it is shown live: scan by scan, with what has happened since the one before."""
+"""A run as it is shown live: what is served, scan by scan, and what has happened since."""
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import dataclass, field, replace
+from functools import partial
+from pathlib import Path
+from typing import Any
 
-from scripts.film.footage import Footage
+from scripts.film.footage import KNOBS, Footage, of_log, of_simulation, title_of
 from scripts.live.hands import Hands
+from scripts.live.requests import Anew
 from sim.events import KIDNAP, Event
+from sim.simulation import Simulation
 from sim.view.moment import BIG_MAP_S, MAP_S, Moments, Shown, verdict_of
 from slam.estimate import Raster
 from slam.frames import NS_PER_S
@@ -39,9 +45,9 @@ class Session:
         return None if self.hands is None else self.hands.simulation.world.scene.static_map
 
     @property
-    def scan_height_m(self) -> float | None:
-        """m, of the scanner above the floor; None for a log."""
-        return None if self.hands is None else self.hands.simulation.world.scene.scan_height_m
+    def scan_height_m(self) -> float:
+        """m, of the scanner above the floor; 0 for a log, which does not say."""
+        return 0.0 if self.hands is None else self.hands.simulation.world.scene.scan_height_m
 
     def run(self) -> Iterator[Shown]:
         """All frames of the stream."""
@@ -77,3 +83,43 @@ def _told(event: Event) -> str:
     if event.kind == KIDNAP:
         return f"{event.start_s:.1f} s: the robot is carried elsewhere"
     return f"{event.start_s:.1f} s: {event.name} {_SAYS.get(event.kind, 'is moved')}"
+
+
+@dataclass(frozen=True, kw_only=True)
+class Opener:
+    """Makes sessions, each from its start.
+
+    slams     by name, the first of them shown
+    path      of a log or a bag, None for a scene
+    settings  of the scene, as ``Simulation`` takes them;   seconds  that it lives
+    """
+
+    slams: Sequence[str]
+    path: Path | None = None
+    settings: Mapping[str, Any] = field(default_factory=dict)
+    seconds: float = 0.0
+
+    def anew(self, request: Anew) -> Opener:
+        """The same with what a page has asked for."""
+        slams = [request.slam or self.slams[0], *self.slams[1:]]
+        asked = {k: getattr(request, k) for k in KNOBS if getattr(request, k) is not None}
+        settings = {**self.settings, **asked} if self.path is None else self.settings
+        return replace(self, slams=list(dict.fromkeys(slams)), settings=settings)
+
+    def open(self) -> Session:
+        """A session at its start.
+
+        Raises ``NeedsLabelsError`` for an oracle on a log without labels, ``LogFormatError`` for a
+        file that cannot be read.
+        """
+        hands = None
+        if self.path is None:
+            simulation = Simulation(**self.settings, labels=True)
+            hands = Hands(simulation)
+            moments = partial(hands.moments, self.seconds)
+            footage = of_simulation(
+                simulation, moments, seconds=self.seconds, title=title_of(self.settings), view=None
+            )
+        else:
+            footage = of_log(self.path)
+        return Session(footage, footage.show(self.slams).moments, hands)

@@ -7,14 +7,12 @@ from collections.abc import Sequence
 
 from scripts import interrupt
 from scripts.live.drawn import Drawn
-from scripts.live.inbox import MOST_WAITING, Inbox
 from scripts.live.network import Network
-from scripts.live.opened import Opener
-from scripts.live.pace import Pace
 from scripts.live.page import CROWDS, Page
-from scripts.live.playback import Playback
-from scripts.live.requests import Anew, Drive, OnView, OnWorld, Seek, Speed
+from scripts.live.playback import Pace, Playback
+from scripts.live.requests import MOST_WAITING, Anew, Drive, Inbox, OnView, OnWorld, Seek, Speed
 from scripts.live.served import Served
+from scripts.live.session import Opener
 from sim.view.moment import Shown
 from slam.errors import InvalidValueError, MobiliaError
 

@@ -21,7 +21,7 @@ from sim.sensors.odometry.fit import OdometryFit, fitted
 from sim.twins.log import Drive, LogTwin, scanner_like
 from slam import create
 from slam.errors import InvalidValueError
-from slam.evaluation.beside import Beside, beside
+from slam.evaluation.evidence import Beside, beside
 from slam.evaluation.scanner.card import measure
 from slam.frames import Float, Frame, LaserSpec, Stream, StreamMetadata
 from slam.logs import open_log

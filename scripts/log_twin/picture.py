@@ -9,7 +9,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from scripts.figures import save, styled
-from slam.evaluation.beside import Beside
+from slam.evaluation.evidence import Beside
 from slam.frames import Float
 
 SHOWN_M = 0.3  # differences beyond are drawn as that

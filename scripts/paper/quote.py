@@ -3,8 +3,8 @@
 
 Between ``<!-- landmarks -->`` and ``<!-- /landmarks -->`` (and so on) the page of the folder that
 has these marks gets what the experiment's ``summary.md`` says. The figures become small PNGs in
-``../pictures/paper``, long tables become CSV files in ``../results``. Between the marks of ``all``
-stands what all took together. The text of an experiment that was not run stays.
+``../pictures/paper``, long tables become CSV files in ``../results``. The text of an experiment
+that was not run stays.
 """
 
 from __future__ import annotations
@@ -34,8 +34,8 @@ def quote(results: Path, folder: Path) -> list[str]:
     """
     texts = {page: page.read_text() for page in sorted(folder.glob("*.md"))}
     found = {}
-    for name in ("all", *EXPERIMENTS):
-        summary = results / ("" if name == "all" else name) / "summary.md"
+    for name in EXPERIMENTS:
+        summary = results / name / "summary.md"
         if not summary.exists():
             continue
         told = summary.read_text().strip()

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-import time
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
@@ -19,13 +18,12 @@ from scipy.ndimage import maximum_filter
 
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
-from scripts.output import RECIPE, read_recipe_words, write_recipe
+from scripts.output import write_recipe
 from scripts.paper.runs import Plan, Run, checksums, load_run
 from slam import create
 from slam.files import replacing, write_text
 from slam.frames import Float
 
-TARGET_S = 45 * 60.0  # all experiments, on 2 cores
 COLORS = {
     "truth": "#168c5a", "odometry": "#de6e18", "occupancy": "#7a3fb0", "EKF": "#1f61be",
     "shunting": "#ce2c3c", "shunting, features": "#e377c2", "shunting, paper preset": "#12a3b4",
@@ -40,12 +38,8 @@ class Report:
 
     name: str
     plan: Plan
-    started: float = field(default_factory=time.perf_counter)
-    cpu_started: float = field(default_factory=time.process_time)
     lines: list[str] = field(default_factory=list)
     quoted: list[str] = field(default_factory=list)  # what the page of all experiments repeats
-    made: tuple[int, int] = (0, 0)  # runs made in this call, and of how many
-    cpu_s: float = 0.0  # processor time of the runs, whenever they were made
     recipe: dict[str, Any] = field(default_factory=dict)
 
     @property
@@ -56,15 +50,9 @@ class Report:
     def run(self, jobs: Iterable[Job]) -> dict[str, Run]:
         """Make the runs that are missing; all of them."""
         listed, runs = list(jobs), self.folder / "runs"
-        missing = sum(not (runs / job.file_name()).exists() for job in listed)
-        self.made = (missing, len(listed))
-        before = time.process_time()
         files = run_jobs(listed, runs, processes=self.plan.processes, title=self.name)
-        self.cpu_started += time.process_time() - before  # the runs have their own
         self.recipe["runs"] = {job.name: dict(job.arguments) for job in listed}
-        done = {name: load_run(file) for name, file in files.items()}
-        self.cpu_s += sum(run.cpu_s for run in done.values())
-        return done
+        return {name: load_run(file) for name, file in files.items()}
 
     def systems(self, systems: Mapping[str, tuple[str, Mapping[str, Any]]]) -> None:
         """Into the recipe: kind, options and whole configuration of each SLAM."""
@@ -107,57 +95,17 @@ class Report:
         self._add([f"![{caption}]({name}.png)", "", f"*{caption}*", ""], quote=True)
 
     def finish(self, title: str) -> None:
-        """Write the page and the recipe; the page says on which machine and how long."""
-        wall_s = time.perf_counter() - self.started
-        page_cpu_s = time.process_time() - self.cpu_started
-        self.cpu_s += page_cpu_s
-        made_on = machine()
-        made, whole = self.made
-        kept = f" ({whole - made} of {whole} runs were there already)" if made < whole else ""
-        said = (
-            f"Processor time of all this {duration(self.cpu_s)}, wall time of this call "
-            f"{duration(wall_s)}{kept}; {self.plan.processes} at a time on "
-            f"{made_on['processor']}, {made_on['cores']} cores"
-            + (" (quick: too short and too few to conclude from)." if self.plan.quick else ".")
-        )
-        page = [f"# {title}", "", said, "", *self.lines]
+        """Write the page and the recipe."""
+        said = ["Quick: too short and too few to conclude from.", ""] if self.plan.quick else []
+        page = [f"# {title}", "", *said, *self.lines]
         write_text(self.folder / "README.md", "\n".join(page).rstrip() + "\n")
-        summary = [*self.quoted, said]
-        write_text(self.folder / "summary.md", "\n".join(summary).rstrip() + "\n")
-        times = {"wall_s": wall_s, "cpu_s": self.cpu_s, "page_cpu_s": page_cpu_s}
-        self._write_recipe({"machine": made_on, **times})
-
-    def _write_recipe(self, measured: Mapping[str, Any]) -> None:
+        write_text(self.folder / "summary.md", "\n".join(self.quoted).rstrip() + "\n")
         plan = self.plan
         settings = asdict(plan) | {"out": str(plan.out), "seeds": plan.seed_list()}
         if plan.data is not None:
             settings["data"] = {"folder": str(plan.data), "sha256": checksums(plan.data)}
-        told = {"plan": settings, **measured, **self.recipe}
+        told = {"plan": settings, "machine": machine(), **self.recipe}
         write_recipe(self.folder, f"reproduce {self.name}", told)
-
-
-def duration(seconds: float) -> str:
-    """``13 s``, ``41 min``."""
-    return f"{seconds:.0f} s" if seconds < 120.0 else f"{seconds / 60.0:.0f} min"
-
-
-def total(plan: Plan, names: Sequence[str], wall_s: float) -> str:
-    """How long these experiments took together, from their recipes."""
-    recipes = [read_recipe_words(plan.out / name / RECIPE)["settings"] for name in names]
-    cpu_s = sum(recipe["cpu_s"] for recipe in recipes)
-    one_s = sum(recipe["page_cpu_s"] for recipe in recipes)  # of one process, after the runs
-    two_s = (cpu_s - one_s) / 2.0 + one_s
-    made_on = machine()
-    told = (
-        f"{', '.join(names)} together: processor time {duration(cpu_s)}, that is "
-        f"{duration(two_s)} on 2 cores; wall time of this call {duration(wall_s)}, "
-        f"{plan.processes} at a time on {made_on['processor']}, {made_on['cores']} cores."
-    )
-    if plan.quick:
-        return told
-    return f"{told} The target is 45 min on 2 cores: " + (
-        "met." if two_s <= TARGET_S else "**missed.**"
-    )
 
 
 def new_figure(width: float, height: float, rows: int = 1, columns: int = 1, **options: Any) -> Any:

@@ -16,7 +16,7 @@ from sim.simulation import stream
 from slam import create, se2
 from slam.evaluation import metrics
 from slam.frames import Float, Frame
-from slam.frontend.odometry_sum import thinned
+from slam.frontend.odometry_steps import thinned
 
 STRIDE = 5  # 37.5 Hz thinned to 7.5 Hz
 SECONDS = 60.0

@@ -4,12 +4,9 @@
 from __future__ import annotations
 
 import hashlib
-import importlib
 import inspect
 import json
 import math
-import time
-import zipfile
 from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cache
@@ -38,7 +35,6 @@ from slam.trajectory import Trajectory
 QUANTITIES = ("x", "y", "θ")
 FIRST_SEED = 200  # of the simulated runs: nothing was tuned or tested on it and those after it
 SEEDS, QUICK_SEEDS = 20, 1
-_CPU = "cpu_s"  # its name in a run's file
 _SCRIPTS = Path(__file__).parents[1]
 # Of what the runs' modules import: these make pages of runs, and no run depends on them.
 _PAGES = frozenset({
@@ -86,11 +82,10 @@ class Plan:
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Run:
-    """One job's file: ``numbers`` (JSON), ``arrays``, and the processor time that it took."""
+    """One job's file: ``numbers`` (JSON) and ``arrays``."""
 
     numbers: Mapping[str, Any]
     arrays: Mapping[str, NDArray[Any]]
-    cpu_s: float = math.nan
 
 
 def save_run(path: Path, numbers: Mapping[str, Any], arrays: Mapping[str, ArrayLike]) -> None:
@@ -105,22 +100,16 @@ def load_run(path: Path) -> Run:
     """Read it back; ``LogFormatError`` for anything else."""
     arrays = read_arrays(path)
     try:
-        numbers, cpu_s = json.loads(str(arrays.pop("numbers"))), arrays.pop(_CPU, math.nan)
-        return Run(numbers=numbers, arrays=arrays, cpu_s=float(cpu_s))
+        return Run(numbers=json.loads(str(arrays.pop("numbers"))), arrays=arrays)
     except (ValueError, TypeError, KeyError) as error:
         raise LogFormatError(path, f"no run of an experiment: {error}") from error
 
 
 def job(name: str, call: Any, /, **arguments: Any) -> Job:
-    """A job that is made again when anything it depends on changes; its processor time is kept."""
+    """A job that is made again when anything it depends on changes."""
     if "data" in arguments:
         arguments["data"] = str(Path(arguments["data"]).resolve())
-    return Job(
-        name=name,
-        call=timed,
-        arguments={"call": f"{call.__module__}:{call.__qualname__}", **arguments},
-        code=depends_on(call, arguments),
-    )
+    return Job(name=name, call=call, arguments=arguments, code=depends_on(call, arguments))
 
 
 def depends_on(call: Callable[..., None], arguments: Mapping[str, Any]) -> tuple[Path, ...]:
@@ -146,15 +135,6 @@ def park_files(folder: Path) -> list[Path]:
 def checksums(folder: Path) -> dict[str, str]:
     """SHA-256 of each of ``park_files``."""
     return {path.name: hashlib.sha256(path.read_bytes()).hexdigest() for path in park_files(folder)}
-
-
-def timed(path: Path, *, call: str, **arguments: Any) -> None:
-    """Let ``call`` ("module:function") write its run, and add the processor time that it took."""
-    started = time.process_time()
-    module, _, name = call.partition(":")
-    getattr(importlib.import_module(module), name)(path, **arguments)
-    with zipfile.ZipFile(path, "a") as file, file.open(f"{_CPU}.npy", "w") as member:
-        np.lib.format.write_array(member, np.array(time.process_time() - started))
 
 
 def truth_of(frames: Sequence[Frame]) -> Trajectory:

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Sections 3.1 to 3.4: what the paper claims of its network, measured on ours."""
+"""Sections 3.1 to 3.4: what the paper claims of its network's cost and overlap, measured on ours.
+
+What it claims of single neurons is held by ``tests/slam/shunting/map``.
+"""
 
 from __future__ import annotations
 
+import time
+from collections.abc import Sequence
+from dataclasses import dataclass, field
 from itertools import pairwise
 from typing import Any
 
 import numpy as np
 
 from scripts.figures import styled
-from scripts.paper import theory_data
 from scripts.paper.landmarks import PAPER_SHARE
 from scripts.paper.point_runs import SHUNTING
 from scripts.paper.report import Report, new_figure
@@ -19,15 +24,20 @@ from sim.simulation import stream
 from slam import se2
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Float, Frame
-from slam.frontend.observations import from_features, from_scan
-from slam.frontend.odometry_sum import thinned
+from slam.frontend.observations import Observations, from_features, from_scan
+from slam.frontend.odometry_steps import thinned
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import FeaturedShuntingSlam
+from slam.shunting.map.network import Network
 from slam.shunting.slam import ShuntingSlam
+from slam.tracker.cells import SIDE, Look
+from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
 
 RED, BLUE, GREEN, GREY = "#ce2c3c", "#1f61be", "#168c5a", "#5b6472"
 STRIDE = 5
+PITCH_M = 20.0
+EVERY_S = 0.2  # between inspirations
 
 
 @styled()
@@ -41,50 +51,14 @@ def reproduce(plan: Plan) -> None:
     steps = 60 if plan.quick else 220
     world = PointWorldConfig(moving=PAPER_SHARE, n_steps=steps)
     points = list(PointWorld(world, seed=FIRST_SEED).stream())
-    _lyapunov(report, office, points)
     _scaling(report, office[0], (1, 10, 100) if plan.quick else (1, 3, 10, 30, 100, 300, 1000))
     _growth(report, office, points)
-    _bell(report)
-    _colours(report, points)
     _overlap(report, points)
     report.finish("Theory (paper: sections 3.1 to 3.4, Fig. 5)")
 
 
-def _lyapunov(report: Report, office: list[Frame], points: list[Frame]) -> None:
-    """V along sweeps under the fixed input of a real frame, in the map of the frames before."""
-    figure, axes = new_figure(9.0, 3.8, columns=2)
-    rows = []
-    for ax, name, frames in zip(axes, ("beams", "features"), (office, points), strict=True):
-        make: Any = ShuntingSlam if name == "beams" else FeaturedShuntingSlam
-        slam = make(ShuntingConfig.paper(cell_m=0.05))
-        for frame in frames[:8]:
-            pose = slam.update(frame.without_truth()).T_map_robot
-        frame = frames[min(8, len(frames) - 1)]
-        if frame.scan is not None:
-            seen = from_scan(frame.scan, np.zeros(3), slam.config)
-        else:
-            assert frame.features is not None
-            seen = from_features(frame.features, slam.config)
-        values, changes = theory_data.lyapunov(slam, seen, pose, sweeps=40, step=0.2)
-        rise = float(np.diff(values).max())
-        rows.append([name, f"{values[0]:.4f}", f"{values[-1]:.4f}", f"{rise:.1e}",
-                     f"{changes[-1]:.1e}"])  # fmt: skip
-        ax.plot(values, "o-", color=RED, ms=3)
-        ax.set(xlabel="sweeps under the same input", title=f"{name}, paper preset")
-    axes[0].set(ylabel="V of Eq. (10)")
-    report.heading("Stability (3.2)")
-    report.say(
-        "V while one real frame is given again and again to the map of the frames before it. The "
-        "proof is about a fixed input: it says that an update settles, nothing about SLAM, where "
-        "poses feed back into the input. The network itself works in 32 bit."
-    )
-    head = ["", "V at first", "V in the end", "largest rise in a sweep", "last change of x"]
-    report.table(head, rows)
-    report.figure("lyapunov", figure, "V never rises beyond rounding")
-
-
 def _scaling(report: Report, frame: Frame, rooms: tuple[int, ...]) -> None:
-    s = theory_data.scaling(frame, rooms)
+    s = scaling(frame, rooms)
     figure, axes = new_figure(9.0, 3.8, columns=2)
     axes[0].plot(s.area, s.update_ms, "o-", color=RED, label="update of the network")
     axes[0].plot(s.area, s.match_ms, "s-", color=BLUE, label="matching")
@@ -126,7 +100,7 @@ def _growth(report: Report, office: list[Frame], points: list[Frame]) -> None:
     figure, axes = new_figure(7.5, 4.2)
     rows = []
     for name, slam, frames, color in cases:
-        area, neurons = theory_data.growth(slam, frames, every=2)
+        area, neurons = growth(slam, frames, every=2)
         axes[0].plot(area, neurons, "-", color=color, label=name)
         past = np.flatnonzero(neurons >= 1000)
         where = f"**{area[past[0]]:.0f}**" if len(past) else "never"
@@ -138,60 +112,6 @@ def _growth(report: Report, office: list[Frame], points: list[Frame]) -> None:
     head = ["", "explored, m²", "neurons, most", "1000 reached at, m²"]
     report.table(head, rows, quote=True)
     report.figure("neurons", figure, "Neurons alive against the area explored")
-
-
-def _bell(report: Report) -> None:
-    offsets, sections = theory_data.bell((1, 3, 10, 30, 100))
-    figure, axes = new_figure(7.0, 4.0)
-    for k, section in sections.items():
-        last = k == max(sections)  # hides the one before: they converge
-        style = {"color": "black", "lw": 1.0, "ls": "--"} if last else {"lw": 2.5, "marker": "o"}
-        label = f"{k} inspiration" + ("s" if k > 1 else "")
-        axes[0].plot(offsets, section, ms=4, label=label, **style)
-    axes[0].set(xlabel="distance from the place in m", ylabel="activity x")
-    axes[0].legend(frameon=False)
-    report.heading("The bell shape (3.1)")
-    whole = all(is_bell(section) for section in sections.values())
-    report.say(
-        "Inspirations at one place, 5 a second, paper preset (lateral weights on): the activity "
-        + ("falls on both sides of its top after each." if whole else "**is no bell.**")
-    )
-    report.figure("bell", figure, "Activity across a place that is seen again and again")
-
-
-def is_bell(section: Float) -> bool:
-    """Rises to one top, falls after it."""
-    top = int(section.argmax())
-    rising, falling = np.diff(section[: top + 1]), np.diff(section[top:])
-    return bool((rising >= 0.0).all() and (falling <= 0.0).all())
-
-
-def _colours(report: Report, points: list[Frame]) -> None:
-    """The library's sweep, in order, against one that could run on four threads."""
-    config = ShuntingConfig.paper(cell_m=0.05)
-    features = points[0].features
-    assert features is not None
-    seen = from_features(features, config)
-    one, given = theory_data.library_sweeps(seen, config, sweeps=40, step=0.5)
-    four = theory_data.colour_sweeps(given, config, sweeps=40, step=0.5)
-    apart = [float(np.abs(a - b).max()) for a, b in zip(one, four, strict=True)][1:]
-    left = [[float(np.abs(x - run[-1]).max()) for x in run[1:-1]] for run in (one, four)]
-    figure, axes = new_figure(7.0, 4.0)
-    sweeps = np.arange(1, 41)
-    axes[0].plot(sweeps[:-1], left[0], color=RED, label="the library, in order, from its end")
-    axes[0].plot(sweeps[:-1], left[1], "--", color=BLUE, label="four colours, from its end")
-    axes[0].plot(sweeps, apart, color=GREY, label="one from the other")
-    axes[0].set(yscale="log", xlabel="sweeps", ylabel="largest difference of an activity")
-    axes[0].legend(frameon=False)
-    report.heading("Multi-colour Gauss-Seidel (3.4)")
-    report.say(
-        f"The input of a real frame, {int((given > 0.0).sum())} neurons, lateral weights on. After "
-        f"the first sweep the library's and one in four colours are {apart[0]:.1e} apart, after 40 "
-        f"{apart[-1]:.1e} (the library's network is in 32 bit): one fixed point. SLAM takes one "
-        "sweep a scan; the library sweeps in order and uses no threads.",
-        quote=True,
-    )
-    report.figure("colours", figure, "Sequential and multi-colour sweeps")
 
 
 def _overlap(report: Report, points: list[Frame]) -> None:
@@ -233,7 +153,7 @@ def _about_nearest(
     whole = slam.network.extent()
     assert whole is not None
     shape = (whole[3] - whole[1], whole[2] - whole[0])
-    inputs = theory_data.inputs_of(slam.network, shape, whole[0], whole[1])
+    inputs = inputs_of(slam.network, shape, whole[0], whole[1])
     given = inputs[j0 - whole[1] :, i0 - whole[0] :][:size, :size]
     return np.maximum(y, x / slam.config.saturation), given, (i0, j0)
 
@@ -265,3 +185,107 @@ def fig5(activity: Float, given: Float, corner: tuple[int, int], cell: float) ->
     )
     axes[2].legend(frameon=False, fontsize=8)
     return figure
+
+
+@dataclass(eq=False)
+class Scaling:
+    """One row for each map size: m^2, neurons alive, neurons visited by an update, ms of an update
+    and of a match (medians of process time)."""
+
+    area: list[float] = field(default_factory=list)
+    alive: list[int] = field(default_factory=list)
+    visited: list[int] = field(default_factory=list)
+    update_ms: list[float] = field(default_factory=list)
+    match_ms: list[float] = field(default_factory=list)
+
+
+def scaling(frame: Frame, rooms: Sequence[int], repeats: int = 15) -> Scaling:
+    """The same scan in maps that hold ever more copies of what it shows, ``PITCH_M`` apart."""
+    config = ShuntingConfig(range_m=9.0)
+    assert frame.scan is not None
+    seen = from_scan(frame.scan, np.zeros(3), config)
+    matcher, out = Matcher(config), Scaling()
+    network, made = Network(config), 0
+    for count in rooms:
+        for k in range(made, count):  # nearest first, so that the first one is the origin
+            _look(network, seen, _place(k))
+        made = count
+        update, match, visited = [], [], 0
+        for _ in range(repeats):
+            start = time.process_time()
+            visited = _look(network, seen, np.zeros(3)).visited
+            middle = time.process_time()
+            matcher.climb(network, seen, np.array([0.02, 0.01, 0.01]), np.zeros(3), np.eye(3))
+            update.append(middle - start)
+            match.append(time.process_time() - middle)
+        out.area.append(count * PITCH_M**2)
+        out.alive.append(alive(network))
+        out.visited.append(visited)
+        out.update_ms.append(1e3 * float(np.median(update)))
+        out.match_ms.append(1e3 * float(np.median(match)))
+    return out
+
+
+def _place(k: int) -> Float:
+    """Cell k of a square spiral."""
+    x = y = 0
+    dx, dy, leg, left, turns = 1, 0, 1, 1, 0
+    for _ in range(k):
+        x, y, left = x + dx, y + dy, left - 1
+        if left == 0:
+            dx, dy, turns = -dy, dx, turns + 1
+            leg += turns % 2 == 0
+            left = leg
+    return np.array([x * PITCH_M, y * PITCH_M, 0.0])
+
+
+def _look(network: Network, seen: Observations, pose: Float) -> Look:
+    rasterise(network, seen, pose)
+    T_map_laser = se2.compose(pose, seen.T_robot_laser)
+    return network.integrate(seen.view, T_map_laser, EVERY_S, write=True)
+
+
+def alive(network: Network) -> int:
+    """Neurons that are not silent."""
+    slots = network.cells.directory[network.cells.directory >= 0]
+    return int(((network.cells.x[slots] > 0.0) | (network.cells.y[slots] > 0.0)).sum())
+
+
+def growth(slam: ShuntingSlam, frames: Sequence[Frame], every: int) -> tuple[Float, Float]:
+    """Area explored (m^2, in squares of 1 m) and neurons alive, at every so many frames."""
+    explored: set[tuple[int, int]] = set()
+    area, neurons = [], []
+    for k, frame in enumerate(frames):
+        pose = slam.update(frame.without_truth()).T_map_robot
+        if k % every:
+            continue
+        explored.update(map(tuple, np.floor(_free(frame, pose)).astype(int).tolist()))
+        area.append(float(len(explored)))
+        neurons.append(float(alive(slam.network)))
+    return np.array(area), np.array(neurons)
+
+
+def _free(frame: Frame, pose: Float) -> Float:
+    """(n, 2) places seen: along the beams, or the half disc of a sensor of features."""
+    if frame.scan is not None:
+        ranges = np.where(frame.scan.valid, frame.scan.ranges, 0.0)
+        angles, T = frame.scan.spec.angles, se2.compose(pose, frame.scan.spec.T_robot_laser)
+    else:
+        ranges, angles, T = np.full(91, 12.0), np.linspace(-1.57, 1.57, 91), pose
+    share = np.arange(0.0, 1.0, 0.04)[:, None]
+    r = share * ranges[None, :]
+    points = np.stack([r * np.cos(angles), r * np.sin(angles)], axis=-1).reshape(-1, 2)
+    return se2.transform(T, points)
+
+
+def inputs_of(network: Network, shape: tuple[int, int], i0: int, j0: int) -> Float:
+    """Dense I of the present impressions, neurons (i0 + column, j0 + row)."""
+    cells, out = network.cells, np.zeros(shape)
+    for row, column in np.argwhere(cells.directory >= 0).tolist():
+        scratch = int(cells.scratch_of[cells.directory[row, column]])
+        if scratch < 0:
+            continue
+        j = (row + int(cells.corner[1])) * SIDE - j0
+        i = (column + int(cells.corner[0])) * SIDE - i0
+        out[j : j + SIDE, i : i + SIDE] = cells.impression[scratch]
+    return out

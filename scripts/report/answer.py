@@ -15,6 +15,7 @@ from typing import Any
 from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import FAILED
 from scripts.comparison.tables import by_seed, number
+from scripts.options import PEOPLE
 from scripts.report.study import LEAST_RUNS, verdict
 from scripts.report.words import listed
 from slam.evaluation.statistics import paired, share_interval
@@ -90,8 +91,9 @@ class Standing:
     runs_a_seed: int = 1
 
     def place(self, levels: Sequence[float]) -> str:
-        """Such as "dynamism 0.5 and 1"."""
-        return f"{self.axis} " + listed([f"{level:g}" for level in levels])
+        """Such as "dynamism 0.5 and 1", or "8 and 12 people"."""
+        each = listed([f"{level:g}" for level in levels])
+        return f"{each} {PEOPLE}" if self.axis == PEOPLE else f"{self.axis} {each}"
 
 
 def _each(counts: Sequence[Lost]) -> str:
@@ -181,12 +183,12 @@ def _seen(of: Standing) -> str:
     lost, runs = sum(one.lost for one in counts), sum(one.runs for one in counts)
     failed_ = sum(one.failed for one in counts)
     verb = "failed" if 0 < failed_ == lost else "failed or was lost" if failed_ else "was lost"
-    top = f"{of.axis} {of.levels[-1].at:g}"
+    top = of.place([of.levels[-1].at])
     if not lost:
         span = f"up to {top}" if len(counts) > 1 else f"at {top}"
         return f"was lost in none of {runs} runs in {of.scene}, {span}"
     if lost == runs:
-        already = f", already at {of.axis} {of.levels[0].at:g}" if len(counts) > 1 else f" at {top}"
+        already = f", already at {of.place([of.levels[0].at])}" if len(counts) > 1 else f" at {top}"
         return f"{verb} in {lost} of {runs} runs in {of.scene}{already}"
     if len(counts) == 1:
         return f"{verb} in {counts[0].lost} of {runs} runs in {of.scene} at {top}"
@@ -210,7 +212,10 @@ def _concluded(of: Standing) -> str:
     sure = f"so at least {100.0 * low:.0f} % of such runs are lost{where} (95 %)"
     before = [level for level in holds if level.at < first.at]
     if before and all(level.subject.half for level in of.levels if level.at >= first.at):
-        return f"it holds at {before[-1].at:g} and is lost at {first.at:g}, {sure}"
+        begins = f"at {first.at:g}"
+        if of.axis == PEOPLE:
+            begins = f"from {of.place([first.at])} on in {of.scene}"
+        return f"it holds at {before[-1].at:g} and is lost {begins}, {sure}"
     return sure
 
 
@@ -248,8 +253,8 @@ def _runs_to_tell(seen: Lost, most: int) -> int:
 def _first_level(of: Standing) -> str:
     """What the lowest level tells: a SLAM that is bad there has another problem than the axis."""
     low = of.levels[0]
-    what = "what moves" if of.axis == LEVEL else of.axis
-    so = f", so {what} is not its problem" if low.at == 0.0 else ""
+    what = {LEVEL: "what moves is", PEOPLE: "people are"}.get(of.axis, f"{of.axis} is")
+    so = f", so {what} not its problem" if low.at == 0.0 else ""
     if low.against == -1:
         return f"at {low.at:g} it is already worse than its own odometry{so}"
     if low.subject.half and so:

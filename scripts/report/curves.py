@@ -9,6 +9,7 @@ from collections.abc import Mapping, Sequence
 from matplotlib.axes import Axes
 from matplotlib.ticker import MaxNLocator
 
+from scripts import figures
 from scripts.closed_loop.folder import Driven
 from scripts.comparison.csv_files import Row
 from scripts.comparison.tables import number
@@ -22,7 +23,7 @@ WIDTH, HEIGHT = 4.0, 2.8  # inches
 SUCCESS = ("success", "success_low", "success_high")
 PRECISION = ("precision_m", "precision_m_low", "precision_m_high")
 _OF = {SUCCESS: ("goals",), PRECISION: ("reached", "wrong")}  # whose sum each is of
-Lines = Mapping[str, Sequence[style.Point]]
+Lines = Mapping[str, Sequence[figures.Point]]
 """By SLAM, its points at the levels."""
 
 
@@ -71,13 +72,13 @@ def few_goals(row: Row, keys: tuple[str, str, str]) -> bool:
 def _draw(ax: Axes, lines: Lines, levels: Sequence[float], axis: str, slams: Sequence[str]) -> None:
     """Each SLAM's line a little beside the level, in its colour and mark among ``slams``."""
     for slam, points in lines.items():
-        aside = style.apart(slam, list(lines), levels)
+        aside = figures.apart(slam, list(lines), levels)
         moved = [(at + aside, value, low, high) for at, value, low, high in points]
-        style.line(ax, moved, style.color(slam, slams), style.marker(slam, slams))
-    style.level_axis(ax, levels, axis)
+        figures.line(ax, moved, style.color(slam, slams), figures.marker(slam, slams))
+    figures.level_axis(ax, levels, axis)
 
 
-def _points(study: Study, scene: str, slam: str, metric: Metric) -> list[style.Point]:
+def _points(study: Study, scene: str, slam: str, metric: Metric) -> list[figures.Point]:
     rows = (study.level(scene, level, slam, metric.key) for level in study.levels)
     keys = ("value", "low", "high")
     return [
@@ -87,7 +88,7 @@ def _points(study: Study, scene: str, slam: str, metric: Metric) -> list[style.P
     ]
 
 
-def _point(row: Row, keys: tuple[str, str, str], factor: float, *, few: bool) -> style.Point:
+def _point(row: Row, keys: tuple[str, str, str], factor: float, *, few: bool) -> figures.Point:
     """Level, value and the ends of its interval, which one of too few has not."""
     value, low, high = (math.nan if row[k] is None else row[k] * factor for k in keys)
     return row["dynamism"], value, *((math.nan, math.nan) if few else (low, high))
@@ -96,7 +97,7 @@ def _point(row: Row, keys: tuple[str, str, str], factor: float, *, few: bool) ->
 def _runs(ax: Axes, study: Study, scene: str, metric: Metric) -> None:
     """Single runs as dots."""
     for slam in study.slams:
-        aside = style.apart(slam, study.slams, study.levels)
+        aside = figures.apart(slam, study.slams, study.levels)
         for level in study.levels:
             values = [number(run, metric.key) for run in study.runs(scene, level, slam)]
             shown = [v * metric.factor for v in values if v is not None and math.isfinite(v)]

@@ -211,17 +211,10 @@ def study(folder: Path, subject: str | None = None) -> Study:
 MAKE = "mobilia compare --slam A B --out DIR makes a folder for it"
 # What other commands left, and what to do with it instead.
 _OTHERS = {
-    "run": f"is of mobilia run. A report is about a comparison: {MAKE}; "
-    "mobilia blame {folder} says what misled this run",
-    "demo": f"is of mobilia demo. A report is about a comparison: {MAKE}; "
-    "mobilia render {folder} films this run",
-    "drive": "is of mobilia drive. It is a part of the report on a comparison: "
-    "mobilia report COMPARISON --drive {folder}",
-    "benchmark": "is of mobilia benchmark: index.html there is its page; "
-    "each track has one, mobilia report {folder}/TRACK",
-    "days": "is of the benchmark's section over days: days.csv has its scores",
-    "lifelong": "is of mobilia lifelong: index.html there is its page",
-    "blame": "is of mobilia blame: index.html there is its page",
+    **dict.fromkeys(("run", "demo"), f"a report is about a comparison, {MAKE}"),
+    **dict.fromkeys(("benchmark", "lifelong", "blame"), "index.html there is its page"),
+    "days": "days.csv has its scores",
+    "drive": "mobilia report COMPARISON --drive shows it",
 }
 _DATASET = (
     "is a dataset of mobilia generate. A report is about a comparison: " + MAKE + "; "
@@ -240,7 +233,7 @@ def check_comparison(folder: Path) -> None:
     words = _recipe(folder)
     command = words.get("command")
     if command in _OTHERS:
-        raise LogFormatError(folder, _OTHERS[command].format(folder=folder))
+        raise LogFormatError(folder, f"is of mobilia {command}: {_OTHERS[command]}")
     if command is None and "recipe" in words:
         raise LogFormatError(folder, _DATASET.replace("a dataset", "an episode"))
     if any(os.path.lexists(folder / name) for name in (RUNS, LEVELS, PAIRED)):

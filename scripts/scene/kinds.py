@@ -10,9 +10,8 @@ import cv2
 import numpy as np
 
 import scenes
-from scenes.kinds import KINDS
+from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
-from scenes.scene_file import PUSHED
 from scripts.scene.picture import Picture
 from sim.view.mapview import MapView
 

@@ -15,7 +15,6 @@ from scripts.days.one import Maps, kept, session_of
 from scripts.film.encode import Pace
 from scripts.film.footage import of_log, of_scene
 from scripts.pace import Work
-from scripts.single_run.costs import INPUT, Costs
 from scripts.single_run.session import Outputs, run_session
 from scripts.single_run.understood import UntrustedRunError, distrust, mount_of, tell
 
@@ -49,8 +48,7 @@ def on_log(
 ) -> dict[str, Any]:
     """Run SLAMs on a recorded log; the first of them in a map of days before, if ``maps`` says."""
     path = log.path
-    costs = Costs()
-    with costs.stage(INPUT), working(f"reading {path.name}"):
+    with working(f"reading {path.name}"):
         footage = of_log(
             path, strict=log.strict, text_format=log.text_format,
             mount=mount_of(log.laser), flip=log.flip,
@@ -77,7 +75,6 @@ def on_log(
             overwrite=overwrite,
             film=film,
             pace=Pace.of_log(footage.duration_s, footage.stream.length or 1),
-            costs=costs,
         ),
     )
     if session is not None and maps is not None:

@@ -44,6 +44,7 @@ def results(replay: Replay, wall_s: float, machine: Mapping[str, Any]) -> dict[s
 def scores(track: Track, truth: Trajectory | None, duration_s: float) -> dict[str, Any]:
     """The block of one SLAM."""
     spent = np.array(track.durations_s)
+    spent = spent[np.isfinite(spent)]  # of a SLAM that ran elsewhere nothing is known
     judged = replace(
         Judged.of(track, truth if truth is not None and len(truth) >= 2 else None),
         steady_s=spent[WARM_UP:] if len(spent) > 2 * WARM_UP else spent,

@@ -4,11 +4,14 @@
 from __future__ import annotations
 
 import json
+import math
+import os
+import resource
+import sys
 import time
 from collections.abc import Callable, Mapping
 from contextlib import nullcontext
 from dataclasses import dataclass, field
-from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -29,7 +32,6 @@ from scripts.output import whole_folder, write_recipe
 from scripts.pages import page as pages
 from scripts.pages.page import Page, Part, command
 from scripts.single_run import score
-from scripts.single_run.costs import FILM, MAP, PICTURES, SLAM, Costs, in_words
 from scripts.single_run.small_maps import Drawn, drawn, for_file
 from sim.view.draw import Picture
 from slam.errors import InvalidValueError
@@ -52,7 +54,6 @@ class Outputs:
     film: bool = True
     film_fps: float = FPS
     pace: Pace | None = None  # of the film; None: real time, or faster for it to last a minute
-    costs: Costs | None = None  # what reading has cost; None: counted from here on
 
 
 # What the colours of the pictures mean.
@@ -61,6 +62,7 @@ MAP_LEGEND = {"#800026": "stands there for long", "#fd8d3c": "seen lately, or no
 CHANGES_LEGEND = {"#238b45": "new: seen, hardly in long-term memory",
                   "#cb181d": "gone: in long-term memory, seen empty",
                   "#888": "as before"}  # fmt: skip
+_RSS_BYTES = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss
 Writer = Callable[[Path, Show], None]
 _files: dict[str, Writer] = {}
 
@@ -84,7 +86,7 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
 
     The folder appears when it is whole. Returns what ``results.json`` holds.
     """
-    replay = show.replay
+    replay, before_s = show.replay, _spent_s()
     if outputs.film:
         require_ffmpeg()
     with whole_folder(
@@ -93,45 +95,61 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         command=outputs.command,
         settings=outputs.settings,
     ) as folder:
-        costs = outputs.costs or Costs()
         show.pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
         pace, path = show.pace, folder / "film.mp4"
         reel = film(path, pace.fps, preset=pace.preset) if outputs.film else nullcontext()
         recorder = Recorder.of(folder / "replay.html", show) if outputs.film else nullcontext()
         liveliest, started = Liveliest(show.duration_s / 3.0), time.perf_counter()
-        with costs.beside(FILM), reel as opened, recorder as recording, costs.scans():
+        with reel as opened, recorder as recording:
             kept = KeptScans()
-            frames = shoot(costs.reading(stream), show, opened, partial(costs.stage, FILM))
-            for frame in watched(frames, stream, show.title):
+            for frame in watched(shoot(stream, show, opened), stream, show.title):
                 kept.note(frame, show.track().estimates[-1].T_map_robot)
                 if recording is not None and opened is not None and show.shown is not None:
                     liveliest.note(frame, show.shown.seconds, opened.last)
-                    with costs.stage(FILM):
-                        recording.note(show.shown)
+                    recording.note(show.shown)
         wall_s = time.perf_counter() - started
-        with costs.stage(SLAM), working("closing loops, scoring"):
+        with working("closing loops, scoring"):
             results = _scored(replay, wall_s, kept)
-        with costs.stage(MAP), working("writing map and paths"):
+        with working("writing map and paths"):
             _write_paths(folder, replay, int(stream.metadata.extra.get(EPOCH, 0)))
             in_pictures = _write_map(folder, show)
-        with costs.stage(PICTURES), working("drawing map, paths and errors"):
+        with working("drawing map, paths and errors"):
             _draw(folder, show, in_pictures)
             if opened is not None and opened.last is not None:
                 poster = _poster(show, in_pictures, opened.last, liveliest.picture)
                 imageio.imwrite(folder / "poster.png", poster)
         for name, write in _files.items():
             write(folder / name, show)
-        results["cost"] = costs.block(replay)
+        results["cost"] = cost = _cost(replay, _spent_s() - before_s)
         write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
         write_recipe(folder, outputs.command, outputs.settings)
         table = score.table(results, show.title)
         page = _page(outputs, show, results, table)
         pages.write(folder, page)
     console.print(table)
-    for words in filter(None, (score.agreement_words(results), in_words(results["cost"]))):
+    spent = (
+        f"Processor time: {cost['slam_s']:.0f} s of SLAM, {cost['rest_s']:.0f} s of all else; "
+        f"memory at most {cost['memory_mb']} MB."
+    )
+    for words in filter(None, (score.agreement_words(results), spent)):
         say(escape(words), highlight=False)
     pages.tell(outputs.folder, page)
     return results
+
+
+def _cost(replay: Replay, spent_s: float) -> dict[str, Any]:
+    """For ``results.json``: s of processor time of all updates and of all else, and MB."""
+    updates_s = (s for track in replay.tracks.values() for s in track.durations_s)
+    slam_s = sum(s for s in updates_s if math.isfinite(s))
+    most_mb = resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * _RSS_BYTES / 1e6
+    rest_s = max(spent_s - slam_s, 0.0)
+    return {"slam_s": round(slam_s, 1), "rest_s": round(rest_s, 1), "memory_mb": round(most_mb)}
+
+
+def _spent_s() -> float:
+    """s of this process and of those that it started and that have ended."""
+    times = os.times()
+    return times.user + times.system + times.children_user + times.children_system
 
 
 def _poster(show: Show, drawn: Drawn | None, last: Picture, liveliest: Picture | None) -> Picture:

@@ -27,7 +27,7 @@ def settings() -> dict[str, dict[str, Any]]:
     found = {}
     for track in newest().values():
         plan = track.plan((), (TRACK_SEED,))
-        found[f"track_{track.name}"] = plan.recipe(plan.runs()[-1]).simulation()
+        found[f"track_{track.family}"] = plan.recipe(plan.runs()[-1]).simulation()
     for name in scenes.names():
         found[f"scene_{name}"] = {"scene": name, "seed": SCENE_SEED, "dynamism": 1.0}
     return found

@@ -25,7 +25,7 @@ from scripts.options import (
     named,
 )
 from slam.errors import InvalidValueError
-from slam.evaluation.divergence import Rule
+from slam.evaluation.lost import Rule
 
 if TYPE_CHECKING:
     from scripts.debugger.counterfactual import Inquest

@@ -19,6 +19,7 @@ from scripts.options import (
     Jobs,
     MotionLevels,
     Oracles,
+    PeopleLevels,
     PlanOnly,
     Scanner,
     Set,
@@ -46,6 +47,7 @@ def compare(
     ] = None,
     motion: MotionLevels = None,
     change: ChangeLevels = None,
+    people: PeopleLevels = None,
     crowd: CrowdOption = None,
     seeds: Annotated[int, typer.Option(help="Seeds at every level, the same at each.")] = 10,
     first_seed: Annotated[
@@ -74,7 +76,8 @@ def compare(
 ) -> None:
     """Run SLAMs on the same simulated runs; write tables of error against dynamism.
 
-    With levels of --motion or --change instead, the other of the two is at 0 unless it is given.
+    With levels of --motion or --change instead, the other of the two is at 0 unless it is given;
+    with --people, motion is 0.5 and change 0.
     It ends with a sentence about the SLAM named first: from which level on it is lost.
     If it is killed, the same command continues. With a SLAM added, only that SLAM runs.
     With --sessions it also says how the SLAMs do in a map some sessions old.
@@ -91,7 +94,7 @@ def compare(
     from scripts.comparison.plan import Plan, ahead
 
     workers.check_jobs(jobs)
-    axis, at, held = axis_levels(dynamism, motion, change)
+    axis, at, held = axis_levels(dynamism, motion, change, people)
     plan = Plan(
         slams=slams,
         scenes=rooms,

@@ -51,15 +51,18 @@ def _print(finding: Finding) -> None:
 
 
 def _print_sizes() -> None:
-    from scripts.doctor.sizes import sizes, totals
+    import os
+    from importlib import metadata
 
-    found = sizes()
-    table = Table("package", "version", "MB", "needed for")
-    table.columns[2].justify = "right"
-    for size in found:
-        if size.megabytes >= 0.5:
-            table.add_row(size.name, size.version, f"{size.megabytes:.0f}", escape(size.group))
+    found = {}
+    for one in metadata.distributions():
+        files = (file.locate() for file in one.files or ())
+        there = (os.lstat(file).st_size for file in files if os.path.lexists(file))
+        found[f"{one.metadata['Name']} {one.version}"] = sum(there) / 1e6
+    table = Table("package", "MB")
+    table.columns[1].justify = "right"
+    for name, megabytes in sorted(found.items(), key=lambda item: (-item[1], item[0])):
+        if megabytes >= 0.5:
+            table.add_row(name, f"{megabytes:.0f}")
     console.print(table)
-    parts = [f"{group} {mb:.0f} MB" for group, mb in totals(found).items()]
-    whole = sum(size.megabytes for size in found)
-    say(escape(f"{whole:.0f} MB in all: {', '.join(parts)}"))
+    say(f"{sum(found.values()):.0f} MB in all")

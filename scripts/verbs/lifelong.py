@@ -16,8 +16,12 @@ from scripts.options import CrowdOption, Motion, Overwrite, PlanOnly, Scanner, n
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
+    from scripts.days.lifelong import Building
     from scripts.days.sessions import Drive
     from sim.recording.recipe import Recipe
+
+
+Row = dict[str, Any]
 
 
 def lifelong(
@@ -127,12 +131,12 @@ def _write(
             rows, aged = life.lived(buildings, _noted(drives, kept))
         living = next((b for b in buildings if not b.anew), None)
         changed = Changed() if living is None else changes_of(folder, living, kept)
-        failures = {b.name: b.failures[0] for b in buildings if b.failures}
         tables.write(folder, rows, settings, changed.score, aged)
         by_slam = {name: [row for row in rows if row["slam"] == name] for name in names}
+        said = {b.name: _sentence(b, by_slam[b.name], aged) for b in buildings}
         lives = [
             Part(
-                title=f"The life of {name}", note=tables.verdict(own, failures.get(name)),
+                title=f"The life of {name}", note=said[name],
                 table=tables.printed(name, own, whole=True),
             )
             for name, own in by_slam.items()
@@ -153,8 +157,19 @@ def _write(
         write_page(folder, page)
     for name, own in by_slam.items():
         console.print(tables.printed(name, own))
-        say(escape(tables.verdict(own, failures.get(name))))
+        say(escape(said[name]))
     tell(path, page)
+
+
+def _sentence(building: Building, rows: list[Row], aged: list[Row]) -> str:
+    """What the sessions of a SLAM come to."""
+    from scripts.days.scores import of_building
+    from scripts.report.score_tables import sentences
+
+    of = {"scene": "", "motion": 0.0, "change": 0.0, "seed": 0, "slam": building.name}
+    old = [row for row in aged if row["slam"] == building.name]
+    failure = building.failures[0] if building.failures else None
+    return sentences([of_building(of, rows, old, failure)])[0]
 
 
 def _noted(drives: Iterator[Drive], kept: dict[int, Drive]) -> Iterator[Drive]:

@@ -30,7 +30,7 @@ from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
     from scripts.live.network import Network
-    from scripts.live.opened import Opener
+    from scripts.live.session import Opener
 
 PORT = 8765
 
@@ -88,16 +88,16 @@ def live(
         raise InvalidValueError(f"--speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {speed:g}")
     slams = list(with_set(slam or ["shunting"], set_ or []))
     check(slams, scene)
-    from scripts.live import gate, opened, served
+    from scripts.live import gate, served, session
 
     allowed = [gate.origin_of(text) for text in allow_origin or []]
     served.require()
     held = Held(motion=motion, change=change, crowd=crowd)
     world = {**held.world(scene, dynamism, seed), "laser": scanner, **staged(events, robot)}
-    opener = opened.Opener(
+    opener = session.Opener(
         slams=slams, path=path, settings=world if path is None else {}, seconds=seconds
     )
-    network = None if ros2 is None else _network(ros2)
+    network = None if ros2 is None else _network(ros2, is_log=path is not None)
     _serve(
         opener, (host, port), allowed, playing=not paused, speed=speed, browser=browser,
         network=network,
@@ -112,17 +112,16 @@ def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
     return log if log is not None else bag
 
 
-def _network(middleware: str) -> Network:
+def _network(middleware: str, *, is_log: bool) -> Network:
     """The robot on the network; ``InvalidValueError``, ``MissingDependencyError``."""
-    from scenes import SCAN_HEIGHT
     from scripts.live.network import Network
     from slam.ros.link import domain_of_environment, open_link, open_to_others
 
-    network = Network(open_link(middleware), height_m=SCAN_HEIGHT)
+    network = Network(open_link(middleware))
     whom = "others on the network" if open_to_others() else "this machine's nodes"
     note(
-        f"ROS 2 over {middleware}, ROS_DOMAIN_ID {domain_of_environment()}: {whom} see the robot, "
-        "drive it and move things."
+        f"ROS 2 over {middleware}, ROS_DOMAIN_ID {domain_of_environment()}: {whom} see the robot"
+        f"{'' if is_log else ', drive it and move things'}."
     )
     return network
 

@@ -114,7 +114,7 @@ def _render(
 ) -> None:
     from scripts.film.encode import film
     from scripts.film.render import Snapshots, shoot, watched
-    from scripts.film.strips import strips
+    from scripts.film.strips import strip
     from scripts.live.replay import Recorder
 
     started = time.perf_counter()
@@ -127,9 +127,7 @@ def _render(
             if recorder is not None:
                 recorder.note(show.shown)
         if strip_to is not None:
-            columns = min(3, len(moments))
-            rows = {"": snapshots.finish()}
-            strips(rows, moments, strip_to, columns=columns, legend=show.legend())
+            strip(snapshots.finish(), moments, strip_to, columns=3, legend=show.legend())
     wall_s = time.perf_counter() - started
     if reel is not None and out is not None:
         long_s = reel.frames / show.pace.fps

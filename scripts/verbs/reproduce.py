@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import importlib
 import os
-import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -16,7 +15,6 @@ from rich.markup import escape
 from scripts.console import note, say
 from scripts.paper import EXPERIMENTS
 from slam.errors import UnknownNameError
-from slam.files import write_text
 
 if TYPE_CHECKING:
     from scripts.paper.runs import Plan
@@ -44,8 +42,7 @@ def reproduce(
 
     [bold]mobilia reproduce landmarks[/bold]
     """
-    names, started = _named(what), time.perf_counter()
-    from scripts.paper.report import total
+    names = _named(what)
     from scripts.paper.runs import Plan
 
     plan = Plan(out=out, seeds=seeds, quick=quick, data=data, processes=jobs or os.cpu_count() or 1)
@@ -56,10 +53,6 @@ def reproduce(
         experiment(name)(plan)
         page = escape(str(plan.out / name / "README.md"))
         say(f"[bold]{name}[/bold]: open {page}")
-    if "all" in what:
-        told = total(plan, names, time.perf_counter() - started)
-        write_text(plan.out / "summary.md", told + "\n")
-        say(escape(told))
     if left_out:
         note("victoria-park is left out: pass --data with the folder of the dataset")
 

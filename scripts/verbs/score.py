@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+from functools import partial
 from pathlib import Path
 from typing import Annotated
 
@@ -12,6 +13,7 @@ from scripts.names import run_name
 from scripts.options import Overwrite
 
 NAME = "recorded"
+MOST_OFFSET_S = 1e10  # 300 years: what is more is no clock
 
 
 def score(
@@ -45,18 +47,20 @@ def score(
     [bold]mobilia score my_bag --on out/dataset/episode-0/bag --pose /amcl_pose[/bold]
     """  # fmt: skip
     from scripts.single_run.run import Log, on_log
+    from sim.core.checks import within
     from slam.frames import EPOCH
     from slam.logs.bag import read_bag
-    from slam.ros.recorded import RecordedSlam, read_statements
-    from slam.ros.template import EPOCH_NS
+    from slam.ros.recorded import RecordedSlam, aligned, read_statements
     from slam.system import register
 
+    within("--clock-offset", clock_offset, -MOST_OFFSET_S, MOST_OFFSET_S)
     log = bag if on is None else on
-    epoch_ns = int(read_bag(log).metadata.extra.get(EPOCH, 0))
-    statements = read_statements(bag, pose=pose, frames=(map_frame, odom_frame))
-    offset_s = clock_offset + (EPOCH_NS - epoch_ns) / 1e9
-    register(NAME)(
-        lambda: RecordedSlam(statements, poses=pose is not None, clock_offset_s=offset_s)
-    )
+    stream = read_bag(log)
+    statements = aligned(
+        bag, read_statements(bag, pose=pose, frames=(map_frame, odom_frame)),
+        next(iter(stream)).stamp_ns, offset_s=clock_offset,
+        epoch_ns=int(stream.metadata.extra.get(EPOCH, 0)),
+    )  # fmt: skip
+    register(NAME)(partial(RecordedSlam, statements, poses=pose is not None))
     folder = out or Path("out") / f"score-{run_name(bag)}"
     on_log([NAME], Log(path=log), folder, overwrite=overwrite, film=film)

@@ -47,33 +47,25 @@ def beside_sheet(scanner: str, out: Path | None) -> None:
 
     Raises ``MobiliaError`` where the scanner departs from its data sheet.
     """
-    from scripts.card import page, rows, stated  # mujoco: only once the environment is known good
+    from scripts.card import page, pictures, rows, stated
     from sim.sensors.lidar.registry import DEFAULT, describe
+    from slam.files import make_folder
 
+    usual = scanner == DEFAULT
     with working("measuring"):
-        measured = rows.rows() if scanner == DEFAULT else stated.rows_of(scanner)
+        measured = rows.rows() if usual else stated.rows_of(scanner)
     cells = [row.cells() for row in measured]
     console.print(page.printed(f"{describe(scanner)} (simulated)", page.HEADINGS, cells))
     if out is not None:
-        _write_card(out, scanner, page.page(scanner, measured))
+        if usual:
+            make_folder(out / "pictures")
+            with working("drawing what each effect does"):
+                pictures.draw(out / "pictures" / "sensor_ablation.png")
+        name = "sensor_card" if usual else f"sensor_card_{scanner}"
+        note(f"wrote {page.write(out, name, page.page(scanner, measured))}")
     broken = [row.what for row in measured if not row.kept]
     if broken:
         raise MobiliaError(f"the scanner departs from its data sheet: {'; '.join(broken)}")
-
-
-def _write_card(out: Path, scanner: str, lines: list[str]) -> None:
-    """The page of one scanner; that of the LMS-221 has figures."""
-    from scripts.card import page
-    from sim.sensors.lidar.registry import DEFAULT
-
-    if scanner != DEFAULT:
-        note(f"wrote {page.write(out, f'sensor_card_{scanner}', lines)}")
-        return
-    with working("drawing the page"):
-        from scripts.card import pictures
-
-        pictures.draw(out / "pictures")
-    note(f"wrote {page.write(out, 'sensor_card', lines)} and its pictures")
 
 
 def beside_log(

@@ -26,7 +26,7 @@ from sim.actors.people.columns import PASSAGE
 from sim.core.bodies import Bodies
 from sim.core.draws import between, waiting
 from sim.core.state import Record, Records, flat, record
-from slam._jit import njit
+from slam._jit import inner
 
 Float = NDArray[np.float64]
 
@@ -50,7 +50,7 @@ SHUT_M, STOPPED_M, STILL_MPS, SLIDE_STARTS_S = (
 HELD_S, EVENT_LEAST_S, EVENT_MOST_S = _D.held_s, _D.event_least_s, _D.event_most_s
 
 
-@njit
+@inner
 def robot_asks(robot: Float, middle: Float) -> bool:
     """Whether the robot (x, y, yaw) comes to, or is in, the doorway around ``middle`` (x, y)."""
     dx, dy = middle[0] - robot[0], middle[1] - robot[1]
@@ -59,7 +59,7 @@ def robot_asks(robot: Float, middle: Float) -> bool:
     return distance < CLEAR or (distance < NEAR and ahead > FACING * distance)
 
 
-@njit
+@inner
 def torque_to(target: float, q: float, qd: float, closer: Record) -> float:
     """N m that turns the leaf to ``target`` at a hand's pace; N for one that slides."""
     rate = min(max(RATE_GAIN * (target - q), -closer.rate), closer.rate)
@@ -88,7 +88,7 @@ class Leaves(NamedTuple):
     draws: NDArray[np.uint64]
 
 
-@njit
+@inner
 def kept_open(time: float, lift: bool, asked: bool, inside: bool, q: float, row: Record) -> bool:
     """Whether a sliding door is to stand open now; ``row`` of the schedule is brought up to date.
 
@@ -107,7 +107,7 @@ def kept_open(time: float, lift: bool, asked: bool, inside: bool, q: float, row:
     return bool(time < row.kept)
 
 
-@njit
+@inner
 def slide_on(time: float, lift: bool, q: float, qd: float, row: Record) -> tuple[float, bool]:
     """Where a sliding door that nobody needs is driven to, and whether it is driven at all.
 
@@ -120,7 +120,7 @@ def slide_on(time: float, lift: bool, q: float, qd: float, row: Record) -> tuple
     return -SHUT_M, q > SHUT_M
 
 
-@njit
+@inner
 def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float, Float]) -> None:
     """One tick of all doors.
 

@@ -19,7 +19,7 @@ from scenes.scene import Scene
 from sim.actors.config import ACTORS
 from sim.core.bodies import Bodies
 from sim.core.state import Records, record
-from slam._jit import njit
+from slam._jit import inner
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -46,7 +46,7 @@ class Held(NamedTuple):
     bodies: Float
 
 
-@njit
+@inner
 def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
     """Write the forces of all hands into ``qfrc``."""
     for k in range(len(held.at)):

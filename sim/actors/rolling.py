@@ -21,7 +21,7 @@ from numpy.typing import NDArray
 from sim.actors.config import ACTORS
 from sim.core.draws import between, uniform
 from sim.core.state import Records, flat, record
-from slam._jit import njit
+from slam._jit import inner
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
@@ -53,7 +53,7 @@ class Rolled(NamedTuple):
     dofs: NDArray[np.int64]
 
 
-@njit
+@inner
 def roll(time: float, tick: float, rolled: Rolled, qvel: Float, qfrc: Float) -> None:
     """Write the generalised forces on all chairs at ``time`` s into ``qfrc``."""
     share, ranks, counters, state, bodies, dofs = rolled
@@ -133,7 +133,7 @@ def inertia_of(model: mujoco.MjModel, names: Sequence[str]) -> tuple[NDArray[np.
         first = int(body.geomadr[0])
         own = range(first, first + int(body.geomnum[0]))
         feet = [g for g in own if model.geom(g).name.startswith(f"{name}/foot")]
-        if feet:  # its friction is under its castors, not in its joints (``sim.actors.castors``)
+        if feet:  # its friction is under its castors, not in its joints (``sim.actors.chairs``)
             grip = float(model.geom_friction[feet[0], 0]) * float(body.mass[0]) * 9.81
             reach = float(np.hypot(*model.geom_pos[feet[0], :2]))
             bodies[i, 2:] = 0.75 * grip, 0.75 * grip * reach

@@ -58,6 +58,7 @@ def _read_robot(qpos: Float, at: int, drive: Records, pose: Float, travel: Float
     for k in range(3):
         pose[k] = qpos[at + k]
     travel[0], travel[1] = drive[0].rolled_left, drive[0].rolled_right
+    travel[2] = drive[0].rolled_side
 
 
 class Bodies:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenes.kinds import KINDS
 from sim.core.bodies import Bodies
 from sim.core.engine import Engine, call_force
-from slam._jit import njit
+from slam._jit import inner
 
 Float = NDArray[np.float64]
 
@@ -60,7 +60,7 @@ class Touches(NamedTuple):
     wrench: Float
 
 
-@njit
+@inner
 def collect(engine: Engine, touches: Touches) -> None:
     """Take over the robot's contacts of the substep just made, before the next ones are found."""
     for i in range(len(touches.geoms)):

@@ -25,7 +25,7 @@ from numba import types
 from numba.extending import intrinsic
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner
 
 
 class Engine(NamedTuple):
@@ -84,7 +84,7 @@ def _call_force(
     return types.void(*(types.int64,) * 5), generate
 
 
-@njit
+@inner
 def call_force(
     function: int, model: int, data: int, contact: int, wrench: NDArray[np.float64]
 ) -> None:

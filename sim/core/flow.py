@@ -17,7 +17,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 FAR = 1e6  # s/(m/s), travel time of a node with no way to the goal
@@ -84,7 +84,7 @@ def slowness(clearance: Float, radius: float) -> Float:
     return out
 
 
-@njit
+@inner
 def _node_time(a: float, b: float, step: float) -> float:
     """Upwind solution at a node whose least neighbours along the axes are ``a`` and ``b``."""
     if a > b:
@@ -124,7 +124,7 @@ def travel_time(slow: Float, cell: float, gi: float, gj: float) -> Float:  # noq
     return T
 
 
-@njit
+@inner
 def _slope(before: float, here: float, after: float) -> float:
     """Upwind difference: towards the lower neighbour, 0 at a minimum."""
     if before >= here and after >= here:
@@ -230,13 +230,15 @@ def way_at(field: Field, goal: int, x: float, y: float) -> tuple[float, float]:
     return dx / norm, dy / norm
 
 
+WALKER_M = 0.27  # m, that a walker needs around its centre
+
+
 class FlowMap:
     """Clearance of a floor and the ways to a set of goals.
 
     bounds     xmin, ymin, xmax, ymax, m; outside is wall
     obstacles  (n, 5) boxes: centre x, y, half sizes m, yaw rad
     goals      (k, 2) m
-    radius     m a walker needs around its centre
     leaves     (m, 5) boxes that ways go around but that are no wall: doors that stand open
     """
 
@@ -246,7 +248,6 @@ class FlowMap:
         obstacles: Float,
         goals: Float,
         *,
-        radius: float = 0.27,
         cell: float = 0.1,
         leaves: Float | None = None,
     ) -> None:
@@ -254,11 +255,11 @@ class FlowMap:
         xmin, ymin, xmax, ymax = (float(b) for b in bounds)
         floor = (xmin, ymin, xmax, ymax)
         self.clearance: Float = clearance_field(boxes, floor, cell, 1.0)
-        slow = slowness(self.clearance, radius)
+        slow = slowness(self.clearance, WALKER_M)
         if leaves is not None and len(leaves) > 0:
             beside = clearance_field(np.ascontiguousarray(leaves), floor, cell, 1.0)
             slow = np.where(
-                slow < FAR, np.maximum(slow, slowness(np.maximum(beside, WALL), radius)), slow
+                slow < FAR, np.maximum(slow, slowness(np.maximum(beside, WALL), WALKER_M)), slow
             )
         shape = (len(goals), *self.clearance.shape)
         self.time: Float = np.zeros(shape)

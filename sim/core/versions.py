@@ -22,7 +22,7 @@ WORLD = 2
 UNSAID = 1
 CHANGES: Mapping[int, str] = {
     0: (
-        "v0 was the world before the table of dynamism was set anew: the same seed gives another "
+        "v0 was the world before the table of dynamism was set again: the same seed gives another "
         "one now. At dynamism d of v0 chairs, bins and loads were pushed as at d / 3 now, doors "
         "moved as at d / 2, and people stayed as long as at 3 d / (1 + 2 d)"
     ),

@@ -18,7 +18,7 @@ from sim.actors.config import ACTORS
 from sim.actors.robot import steered
 from sim.core.checks import check_types
 from sim.driving.navgrid import NavGrid
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.errors import InvalidValueError
 from slam.frames import Float
 
@@ -57,7 +57,7 @@ class TourConfig:
                 raise InvalidValueError(f"TourConfig.{name} must be > 0, got {getattr(self, name)}")
 
 
-@njit
+@inner
 def _field_at(
     field: NDArray[np.float64], x0: float, y0: float, cell: float, x: float, y: float
 ) -> float:
@@ -68,7 +68,7 @@ def _field_at(
     return float(field[i, j])
 
 
-@njit
+@inner
 def _between(
     field: NDArray[np.float64], x0: float, y0: float, cell: float, x: float, y: float
 ) -> float:
@@ -83,7 +83,7 @@ def _between(
     return float((1.0 - b) * low + b * high)
 
 
-@njit
+@inner
 def _nearest_disc(discs: NDArray[np.float64], x: float, y: float, t: float) -> float:
     """Distance to the edge of the nearest disc, each moved on by its velocity for ``t`` s."""
     nearest = _FAR
@@ -94,7 +94,7 @@ def _nearest_disc(discs: NDArray[np.float64], x: float, y: float, t: float) -> f
     return nearest
 
 
-@njit
+@inner
 def _score(  # noqa: PLR0913 (kernel)
     pose: NDArray[np.float64],
     now: NDArray[np.float64],

@@ -16,12 +16,10 @@ from sim.core.checks import number, one_of, switch, whole
 from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
-from sim.gym.goals import GOAL_RADIUS_M, Goal, Ground, goal_of
-from sim.gym.observation import Observation, observed, space_of
+from sim.gym.goals import GOAL_RADIUS_M, REWARDS, Goal, Ground, Task, goal_of
+from sim.gym.observation import MODES, Observation, Rendering, observed, space_of
 from sim.gym.options import checked_seed, checked_settings, clipped, episode
 from sim.gym.pose_source import PoseSource
-from sim.gym.rendering import MODES, Rendering
-from sim.gym.reward import REWARDS, Task
 from sim.sensors.lidar.device import ScanResult
 from sim.sensors.lidar.registry import ScannerConfig
 from sim.simulation import Simulation
@@ -82,7 +80,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     m, or None; `is_success`, whether the goal is reached.
 
     ### Reward
-    0 without a goal, else by ``reward`` (``sim.gym.reward``):
+    0 without a goal, else by ``goals`` (``sim.gym.goals``):
     "progress": m by which the straight line to the goal got shorter during the step;
     "sparse": 1 in the step that reaches the goal, else 0;
     "shaped": m by which the way to it on the static layout got shorter (near walls counted up to
@@ -101,7 +99,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     it is a ``SlamFailedError``. Reward and the end of an episode go by the truth in any case;
     ``goal``: None; "random", in each episode another one on floor that the robot can reach
     (``sim.gym.goals``), from the stream "goals" of the seed; or (x, y) m in the world;
-    ``reward`` "progress", "sparse" or "shaped"; ``frame_skip`` scans to a step under one command;
+    ``goals`` "progress", "sparse" or "shaped"; ``frame_skip`` scans to a step under one command;
     ``scans`` "all", or "last" for a step that takes only its last scan, which is twice as fast with
     four: a SLAM as ``pose_source`` gets no other, and of what may change only what it saw does;
     ``render_mode`` "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None; ``view``

@@ -44,7 +44,7 @@ class Rooms(VecEnv):  # type: ignore[misc]
         super().__init__(rooms.num_envs, rooms.single_observation_space, rooms.single_action_space)
 
     def reset(self) -> Any:
-        """All rooms anew; their observations."""
+        """All rooms again; their observations."""
         seeds: Any = None if None in self._seeds else list(self._seeds)
         observations, _ = self.rooms.reset(seed=seeds)
         self._reset_seeds()

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an environment tells a policy: its space, and ranges as finite numbers."""
+"""What an environment tells a policy, and shows: its space, finite ranges, two pictures."""
 
 from __future__ import annotations
 
@@ -9,7 +9,9 @@ import numpy as np
 from gymnasium import spaces
 from numpy.typing import NDArray
 
+from sim.core.checks import one_of, whole_numbers
 from sim.gym.pose_source import PoseSource
+from sim.simulation import Simulation
 from slam._jit import njit
 from slam.frames import LaserSpec
 
@@ -47,3 +49,52 @@ def observed(
         valid[i] = fits
         out[i] = ranges[i] if fits else most
     return out, valid
+
+
+MODES = ("rgb_array", "map")
+VIEWS = ("top", "follow", "persp")  # of every scene; ``sim.view.camera`` needs OpenGL to import
+MAX_PX = 8192  # edge of a picture
+
+
+class Rendering:
+    """What draws an environment.
+
+    mode  "rgb_array" (3D, needs OpenGL), "map" (2D, needs nothing) or None
+    view  "top", "follow" or "persp" of the former
+    size  (width, height) px
+
+    Raises ``InvalidValueError`` for anything else.
+    """
+
+    def __init__(self, mode: str | None, view: str, size: tuple[int, int]) -> None:
+        if mode is not None:
+            one_of("render_mode", mode, MODES)
+        one_of("view", view, VIEWS)
+        self._mode, self._view = mode, view
+        self._size = whole_numbers("render_size", size, "(width, height) in px", MAX_PX)
+        self._picture: Any = None
+        self._camera: Any = None
+
+    def picture(self, simulation: Simulation) -> NDArray[np.uint8]:
+        """(height, width, 3) uint8 RGB of the simulation that was drawn first since ``close``."""
+        if self._picture is None:
+            self._picture = self._of(simulation)
+        picture: NDArray[np.uint8] = self._picture(simulation)
+        return picture
+
+    def _of(self, simulation: Simulation) -> Any:
+        if self._mode == "map":
+            from sim.view.mapview import MapView
+
+            plan = MapView(simulation.world.scene, *self._size)
+            return lambda now: plan.draw(now.world.mover_poses(), now.frame)
+        from sim.view.camera import Camera
+
+        self._camera = camera = Camera(simulation.world.model, *self._size)
+        return lambda now: camera.render(now.world.data, self._view)
+
+    def close(self) -> None:
+        """Free what draws; the next picture makes it again, of whatever simulation then."""
+        if self._camera is not None:
+            self._camera.close()
+        self._picture = self._camera = None

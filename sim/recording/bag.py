@@ -25,9 +25,7 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from scenes import SCAN_HEIGHT
 from scenes.scene import Mover
 from sim.moments import Moment
-from sim.recording.label_cloud import LabelsMessage
-from sim.recording.objects import ObjectsMessage
-from sim.recording.topics import OURS, MoreTopics
+from sim.recording.topics import OURS, LabelsMessage, MoreTopics, ObjectsMessage
 from slam.estimate import Raster
 from slam.frames import LaserSpec
 from slam.ros.frames import BEGAN, LATCHED, FrameMessages, Message

@@ -104,6 +104,8 @@ class Plan:
             (level,) = self.dynamisms
             return [replace(self.recipe, dynamism=level, session=k) for k in range(self.sessions)]
         first, twin = asdict(self.recipe), "dynamic" if self.twins else ""
+        if self.scenes:
+            first["scene_sha256"] = None  # each finds its own
         return [
             Recipe(
                 **{**first, "scene": s, "dynamism": d, "seed": self.recipe.seed + k, "twin": twin}
@@ -249,7 +251,7 @@ def check_dataset(path: Path) -> list[Finding]:
     files = (*files, PAGE) if PAGE in listed else files
     for name in files:
         if name != PLAN and not os.path.lexists(path / name):
-            why = f"{path / name} is missing: 'mobilia generate' as before writes it again"
+            why = f"{path / name} is missing: 'mobilia generate' as before adds it"
             found.append(Fault(kind="incomplete", name=name, why=why))
     episodes = [check_hashes(path / name, recipe) for name, recipe in planned.items()]
     if listed:
@@ -271,7 +273,7 @@ def _against(
     found = []
     for name in sorted(listed.keys() | sums.keys()):
         if name not in listed:
-            why = f"{path / SUMS} does not list {name}: 'mobilia generate' as before writes it anew"
+            why = f"{path / SUMS} does not list {name}: 'mobilia generate' as before adds it"
         elif name not in sums:
             why = f"{path / SUMS} lists {name}, which no episode has"
         elif sums[name] != listed[name]:

@@ -19,10 +19,9 @@ from sim.actors.rearranging import Rearrangement
 from sim.moments import Moment, toured
 from sim.recording import topics
 from sim.recording.bag import FORMAT, BagWriter
-from sim.recording.rearranged import REARRANGED, write_rearranged
 from sim.recording.recipe import RECIPE, Recipe, write_recipe
-from sim.recording.relations import write_relations
 from sim.recording.sums import write_sums
+from sim.recording.tables import REARRANGED, write_rearranged, write_relations
 from sim.simulation import Simulation
 from sim.twins.twins import TWINS, Twins
 from slam.errors import OutputError

@@ -19,6 +19,7 @@ from typing import Any
 import numpy as np
 
 from scenes.crowd import crowd_of
+from scenes.scene_file import sha256_of
 from sim.core.checks import number, one_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
@@ -43,7 +44,8 @@ MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
 _AXES = ("motion", "change")
 # Added since the first recipes: without a word where they are None.
-_LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s", "events", "robot")
+_LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s", "events", "robot",
+          "scene_sha256")  # fmt: skip
 # Words for some of these in the name of an episode.
 _WORDS = {"share": "moving_share", "at": "change_at_s", "kidnap": "kidnap_every_s"}
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
@@ -74,6 +76,8 @@ class Recipe:
     kidnap_every_s  s after which the robot is carried elsewhere, again and again; None: never
     events      what happens at stated times (``sim.world.script``); None: nothing
     robot       tables of another robot than the scene's (``sim.world.robots``); None: its own
+    scene_sha256  of the files of a scene by its file (``scenes.scene_file``), found where it is not
+                given; None: of another, or not known
     """
 
     scene: str
@@ -93,11 +97,14 @@ class Recipe:
     kidnap_every_s: float | None = None
     events: Sequence[Mapping[str, Any]] | None = None
     robot: Mapping[str, Any] | None = None
+    scene_sha256: str | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
         if not isinstance(self.scene, str) or not self.scene:
             raise InvalidValueError(f"Recipe.scene must be a name, got {self.scene!r}")
+        if self.scene_sha256 is None and not isinstance(self.scene, NameFromFile):
+            object.__setattr__(self, "scene_sha256", sha256_of(self.scene))
         Seeds(self.seed)
         rates = Dynamism.at(self.dynamism)
         Dynamism.of(rates, self.moving_share, motion=self.motion, change=self.change)

@@ -10,13 +10,14 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast
 
+from scenes.scene_file import changed
 from sim.core.versions import not_this_world
 from sim.recording import topics
 from sim.recording.bag import FORMAT, FORMATS, MessageHash
 from sim.recording.episode import record
-from sim.recording.rearranged import REARRANGED
 from sim.recording.recipe import RECIPE, Made, Recipe, read_recipe
 from sim.recording.sums import SUMS, Fault, check_vouched, faults, read_sums
+from sim.recording.tables import REARRANGED
 from slam.errors import LogFormatError, OutputError
 from slam.logs.bag_topics import Bag
 
@@ -80,7 +81,7 @@ def listed_in(folder: Path) -> tuple[dict[str, str], list[Fault]]:
 def check_hashes(folder: Path, planned: Recipe | None = None) -> Finding:
     """Every file against SHA256SUMS, and the recipe against itself and the one that is ``planned``.
 
-    A bag of other bytes but the very messages of the recipe was packed anew, not damaged: then all
+    A bag of other bytes but the very messages of the recipe was packed again, not damaged: then all
     else must be what it was, metadata.yaml too.
     """
     if folder.is_symlink() or not folder.is_dir():
@@ -176,6 +177,10 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
         why = f"not made again: it has topics {wanted!r:.200}, not {here}: load them, --with"
         return Finding(episode=folder.name, verdict="differs", why=why)
     recipe = made.recipe
+    if why := changed(recipe.scene, recipe.scene_sha256):
+        return Finding(
+            episode=folder.name, verdict="differs", why=f"not made again: {recipe.scene} {why}"
+        )
     if trust:
         recipe = replace(recipe, scene=str(recipe.scene))  # as if it had been typed
     with _scratch() as scratch:

@@ -4,7 +4,6 @@
 A stand-in for rendering and detecting, which costs 100 ms a picture. Rate, latency and noise are
 those of a common installation (30 pictures a second, a centimetre; assumed, no source), and the
 line of sight is that of the scene's own geometry: people, furniture and walls hide a tag.
-``scripts/experiments/tag_experiment.py`` really renders and detects, and compares.
 """
 
 from __future__ import annotations

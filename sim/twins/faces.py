@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 ROUNDS = 4
@@ -82,7 +82,7 @@ def _move(box: Float, face: int, inward: Float, along: Float) -> None:
     box[4] += 0.5 * min(max(turn, -TURN_MOST), TURN_MOST)
 
 
-@njit
+@inner
 def _entered(box: Float, x: float, y: float, heading: float) -> tuple[float, int]:
     """m to where a ray enters a box, and the face, -u, +u, -v, +v; (-1, 0) where it does not."""
     c, s = math.cos(box[4]), math.sin(box[4])
@@ -104,7 +104,7 @@ def _entered(box: Float, x: float, y: float, heading: float) -> tuple[float, int
     return (near, face) if 0.0 < near < far else (-1.0, 0)
 
 
-@njit
+@inner
 def _hit(
     boxes: Float, reach: Float, x: float, y: float, heading: float, most: float
 ) -> tuple[int, int, float]:

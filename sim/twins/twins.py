@@ -46,8 +46,8 @@ TWINS = ("dynamic", "semi_static", "static")
 
 @njit
 def rolled(path: Float, track: float) -> Float:
-    """(n, 2) m rolled by left and right wheel along poses (n, 3) without slip."""
-    out = np.zeros((path.shape[0], 2))
+    """(n, 3) m rolled by left and right wheel along poses (n, 3) without slip; 0 sideways."""
+    out = np.zeros((path.shape[0], 3))
     for k in range(1, path.shape[0]):
         dx, dy = path[k, 0] - path[k - 1, 0], path[k, 1] - path[k - 1, 1]
         turn = path[k, 2] - path[k - 1, 2]

@@ -94,9 +94,13 @@ def text(
     color: Color = INK,
     bold: bool = False,
 ) -> int:
-    """Write ``words`` with its top left corner at ``at``; returns the x after it."""
-    mask = _glyphs(words, size, bold)
+    """Write ``words`` with its top left corner at ``at``; returns the x after it.
+
+    What lies outside the picture to the left, to the right or below is cut off.
+    """
     x, y = at
+    mask = _glyphs(words, size, bold)[:, max(-x, 0) :]
+    x = max(x, 0)
     height = min(mask.shape[0], image.shape[0] - y)
     width = min(mask.shape[1], image.shape[1] - x)
     if height <= 0 or width <= 0:

@@ -7,7 +7,6 @@ A robot is a name of ``sim/robots`` or the tables of such a file (``docs/robots.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -19,12 +18,12 @@ from scenes import SCAN_HEIGHT
 from scenes.scene import Scene, at_scan_height
 from sim.actors.robot import DriveConfig
 from sim.core.checks import within, word
-from slam.bounded import text_of
+from slam.bounded import toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
 FOLDER = Path(__file__).parents[1] / "robots"
 MOST_BYTES = 1 << 14
-KINDS = ("differential", "car")
+KINDS = ("differential", "car", "omnidirectional")
 MASS_KG = 22.0  # of the scenes' robot, to which its tyres' stiffness and grip belong
 # table -> field -> (least, most), and what is so where it is not said; None: it must be said
 _FIELDS: dict[str, dict[str, tuple[float, float, float | None]]] = {
@@ -85,11 +84,9 @@ def read_robot(name: str) -> dict[str, Any]:
         raise UnknownNameError(
             f"no robot is called {name!r:.80}. Known: {', '.join(names())}; or a .toml file."
         )
+    tables = toml_of(path, MOST_BYTES)
     try:
-        tables = tomllib.loads(text_of(path, MOST_BYTES))
         robot_of(tables)
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise LogFormatError(path, f"is no TOML: {error}") from error
     except InvalidValueError as error:
         raise LogFormatError(path, str(error)) from error
     return tables
@@ -130,7 +127,7 @@ def robot_of(given: str | Mapping[str, Any] | Robot) -> Robot:
         drive=DriveConfig(
             v_max=drive["v_max_mps"], omega_max=drive["omega_max_radps"],
             accel=drive["accel_mps2"], alpha=drive["alpha_radps2"], track=drive["track_m"],
-            turn_radius=drive["turn_radius_m"],
+            turn_radius=drive["turn_radius_m"], sideways=kind == "omnidirectional",
         ),
         scanner=(place["x_m"], place["y_m"], math.radians(place["yaw_deg"]), place["height_m"]),
     )  # fmt: skip

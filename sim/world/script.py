@@ -14,7 +14,6 @@ people enter, as soon as the place is free.
 from __future__ import annotations
 
 import math
-import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -23,13 +22,13 @@ from typing import Any
 import numpy as np
 
 from scenes.assembly import hull_radius
-from scenes.scene_file import tables
+from scenes.scene_file import changed, tables
 from sim.core.checks import FAR_M, within, word
 from sim.world import hands
 from sim.world.populated import VISITOR
 from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
 from sim.world.world import World
-from slam.bounded import text_of
+from slam.bounded import toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.frames import NS_PER_S
 
@@ -64,10 +63,7 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
     Raises ``LogFormatError`` that names the file, the event and its field.
     """
     path = Path(path)
-    try:
-        tables = tomllib.loads(text_of(path, MOST_BYTES))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
-        raise LogFormatError(path, f"is no TOML: {error}") from error
+    tables = toml_of(path, MOST_BYTES)
     rows = tables.get("event")
     if set(tables) != {"event"} or not isinstance(rows, list) or not rows:
         raise LogFormatError(
@@ -80,12 +76,20 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
     return rows
 
 
-def of_file(scene: object) -> dict[str, Any]:
-    """``events`` and ``robot`` that a scene's own TOML file holds; nothing for other scenes."""
+def of_file(scene: object, sha256: str | None = None) -> dict[str, Any]:
+    """``events`` and ``robot`` that a scene's own TOML file holds; nothing for other scenes.
+
+    Raises ``LogFormatError`` for a scene whose files have another hash than that.
+    """
+    if isinstance(scene, str) and (why := changed(scene, sha256)):
+        raise LogFormatError(scene, why)
     if not (isinstance(scene, str) and scene.endswith(".toml")):
         return {}
     own = tables(Path(scene))
-    return {name: own[key] for key, name in (("event", "events"), ("robot", "robot")) if key in own}
+    found = {new: own[key] for key, new in (("event", "events"), ("robot", "robot")) if key in own}
+    if isinstance(own.get("robot"), str) and own["robot"].endswith(".toml"):
+        found["robot"] = str(Path(scene).parent / own["robot"])
+    return found
 
 
 def cues_of(rows: Sequence[Mapping[str, Any]]) -> tuple[Cue, ...]:

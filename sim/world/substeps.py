@@ -21,7 +21,7 @@ from sim.actors.people.crowd import People, decide
 from sim.actors.people.gait import walk
 from sim.actors.people.leaders import Leaders
 from sim.actors.people.right_of_way import Addresses, Crowd, Doors
-from sim.actors.people.sitting import Hulls, dress
+from sim.actors.people.trips import Hulls, dress
 from sim.actors.robot import ramp, roll
 from sim.actors.rolling import Rolled
 from sim.actors.rolling import roll as roll_chairs
@@ -30,7 +30,7 @@ from sim.core.engine import Engine, call
 from sim.core.flow import Field
 from sim.core.state import Records
 from sim.sensors.lidar.windows import Noted, note
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 SUBSTEPS_PER_S = 300
@@ -91,17 +91,17 @@ class Watch(NamedTuple):
     """What is written down after each substep k: row k of all, longer than a scan where need be.
 
     marks    (n,) whether the scanner notes all poses
-    scanner  where to
-    path     (n, 3) pose of the robot; travel (n, 2) m rolled by the wheels
+    scanner  where to, a plain ``sim.sensors.lidar.windows.Noted``
+    path     (n, 3) pose of the robot; travel (n, 3) m rolled by the wheels, and to the left
     """
 
     marks: NDArray[np.bool_]
-    scanner: Noted
+    scanner: tuple[Any, ...]
     path: Float
     travel: Float
 
 
-@njit
+@inner
 def control(time: float, robot: Robot, physics: Physics, actors: Actors) -> None:
     """Let everybody but the robot decide for the next tick."""
     people, doors = actors.people, actors.doors
@@ -118,7 +118,7 @@ def control(time: float, robot: Robot, physics: Physics, actors: Actors) -> None
         roll_chairs(time, tick, rolled, qvel, qfrc)
 
 
-@njit
+@inner
 def pin(physics: Physics, pinned: Pinned) -> None:
     """Undo what moved the pinned things, or would."""
     for k in range(len(pinned.at)):
@@ -135,7 +135,7 @@ def plain(table: Any) -> Any:
     return tuple(map(plain, table)) if isinstance(table, tuple) else table
 
 
-@njit
+@inner
 def _actors(parts: Any) -> Actors:
     """Inverse of ``plain``."""
     folk, doors, shoved, rolled, pinned = parts
@@ -155,48 +155,25 @@ def _actors(parts: Any) -> Actors:
 
 
 @njit
-def _robot(parts: Any) -> Robot:
-    at, push, touches, drive, tyres, limits = parts
-    return Robot(at, push, Touches(*touches), drive, tyres, limits)
-
-
-@njit
-def decide_first(room: Any) -> None:
-    """Let everybody decide for the tick that begins the run; ``room`` as for ``advance``."""
-    _, _, robot, physics, actors = room
-    control(0.0, _robot(robot), Physics(*physics), _actors(actors))
-
-
-@njit
-def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
-    """``_advance`` for ``plain`` tables; ``room``: clock, engine, robot, physics, actors."""
-    clock, engine, robot, physics, actors = room
-    marks, scanner, path, travel = watch
-    return _advance(
-        first, last, resumed, clock, Engine(*engine), _robot(robot), Physics(*physics),
-        _actors(actors), Watch(marks, Noted(*scanner), path, travel),
-    )  # fmt: skip
-
-
-@njit
-def _advance(  # noqa: C901, PLR0913 (kernel)
-    first: int,
-    last: int,
-    resumed: bool,
-    clock: NDArray[np.int64],
-    engine: Engine,
-    robot: Robot,
-    physics: Physics,
-    actors: Actors,
-    watch: Watch,
-) -> int:
+def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:  # noqa: C901 (kernel)
     """Make the substeps that end at rows ``first + 1`` to ``last`` of ``watch``.
 
     Returns the last row. At the robot's first touch it returns early, with the row before, as it
     does not know yet where contacts are: find out, then call it again from that row, ``resumed``.
+    With ``last`` < ``first`` everybody decides for the tick that begins the run, and that is all:
+    one entry from Python, because of tables as large as these each takes seconds to compile.
 
-    clock  (1,) substeps made since the start
+    room   ``plain``: clock, (1,) substeps made since the start; ``Engine``; ``Robot``;
+           ``Physics``; ``Actors``
+    watch  a ``plain`` ``Watch``
     """
+    clock, parts, (at, push, touched, drives, tyres, limits), arrays, folk = room
+    marks, scanner, path, travel = watch
+    engine, physics, actors = Engine(*parts), Physics(*arrays), _actors(folk)
+    robot = Robot(at, push, Touches(*touched), drives, tyres, limits)
+    if last < first:
+        control(0.0, robot, physics, actors)
+        return last
     people, drive, step = actors.people, robot.drive[0], 1.0 / SUBSTEPS_PER_S
     for row in range(first, last):
         if not (resumed and row == first):
@@ -204,6 +181,7 @@ def _advance(  # noqa: C901, PLR0913 (kernel)
                 ramp(drive, robot.limits)
                 physics.ctrl[robot.tyres[0]] = drive.left
                 physics.ctrl[robot.tyres[1]] = drive.right
+                physics.ctrl[robot.tyres[2]] = drive.side
             call(engine.step2, engine.model, engine.data)
             clock[0] += 1
             roll(drive, step)
@@ -225,11 +203,12 @@ def _advance(  # noqa: C901, PLR0913 (kernel)
             collect(engine, robot.touches)
         call(engine.step1, engine.model, engine.data)
         for k in range(3):
-            watch.path[row + 1, k] = physics.qpos[robot.at[0] + k]
-        watch.travel[row + 1, 0] = drive.rolled_left
-        watch.travel[row + 1, 1] = drive.rolled_right
-        if watch.marks[row + 1]:
-            note(watch.scanner)
+            path[row + 1, k] = physics.qpos[robot.at[0] + k]
+        travel[row + 1, 0] = drive.rolled_left
+        travel[row + 1, 1] = drive.rolled_right
+        travel[row + 1, 2] = drive.rolled_side
+        if marks[row + 1]:
+            note(scanner)
     return last
 
 
@@ -241,8 +220,9 @@ def loose() -> Pinned:
 
 def unseen(rows: int) -> Any:
     """A ``plain`` watch over ``rows`` rows that notes the robot alone."""
-    none = np.zeros(0, dtype=np.int64)
-    flat = np.zeros((0, 3)), np.zeros((0, 9))
-    scanner = Noted(none, none, *flat, *flat, -1, np.zeros((0, 0, 12)), np.zeros((0, 3)), none)
+    none, flat = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
+    runs, poses = np.zeros((0, 4), dtype=np.int64), np.zeros((0, 0, 12))
+    where = (flat, flat, flat, flat, flat, flat, flat)
+    scanner = Noted(none, runs, *where, -1, poses, flat, none)
     marks = np.zeros(rows, dtype=np.bool_)
     return plain(Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 2))))

@@ -45,7 +45,7 @@ class ScanTiming:
     def odometry(
         self, encoders: WheelOdometry, travel: Float, stamp_ns: int, touched: bool
     ) -> Odometry:
-        """Advance the encoders over a scan; ``travel`` (rows, 2) m rolled at its steps."""
+        """Advance the encoders over a scan; ``travel`` (rows, 3) m rolled at its steps."""
         self.roll(encoders, travel, touched)
         return encoders.reading(stamp_ns=stamp_ns, sweep_s=self.sweep_s)
 
@@ -66,7 +66,7 @@ class Sweep:
     """Lets a world live through one scan after the other.
 
     path    (rows, 3) true poses of the robot at the steps of the last scan
-    travel  (rows, 2) m that its wheels had rolled at these
+    travel  (rows, 3) m that its wheels had rolled at these, left, right and sideways
     timing  of that scan's beams among the steps
 
     Where a scan begins between two steps, row 0 is the step before.
@@ -76,7 +76,7 @@ class Sweep:
 
     def __init__(self, laser: LaserScanner) -> None:
         rows = laser.caster.poses.shape[0]  # for a scan of whatever phase
-        self._rows: tuple[Float, Float] = (np.zeros((rows, 3)), np.zeros((rows, 2)))
+        self._rows: tuple[Float, Float] = (np.zeros((rows, 3)), np.zeros((rows, 3)))
         self._window: Window | None = None  # that watch and timing are of
         self._watch: Any = None
         self.path, self.travel = self._rows

@@ -15,8 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.scene import Scene
-from sim.actors.castors import checked_level, stand_on_castors
-from sim.actors.chairs import Shoves, pushers, tables
+from sim.actors.chairs import Shoves, checked_level, pushers, stand_on_castors, tables
 from sim.actors.doors import Doors
 from sim.actors.people.people import People
 from sim.actors.rearranging import Rearrangement, Rearranging
@@ -58,7 +57,7 @@ class World:
     drive     limits of the robot
     start     (x m, y m, heading rad) of the robot instead of the scene's; a crowd that is put into
               the scene is put around it, one that is in a built ``Scene`` stays where it is
-    chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.castors``)
+    chairs    "planar", or "free": standing on castors, able to rock (``sim.actors.chairs``)
     robot     another than the scene's (``sim.world.robots``), by its name or from its tables
     visitors  people who are outside until ``admit`` lets them in
     options   passed on to ``scenes.build`` when the scene is given by name, e.g. ``n_chairs=10``;
@@ -123,7 +122,7 @@ class World:
         self._pinned = substeps.loose()
         self._room = self._tables()
         self._unseen = substeps.unseen(2)
-        substeps.decide_first(self._room)
+        substeps.advance(0, -1, False, self._room, self._unseen)  # decide, and no more
         mujoco.mj_step1(self.model, self.data)
 
     def _doors_and_people(self) -> tuple[Doors, People]:
@@ -246,9 +245,9 @@ class World:
 
     # -- the robot --------------------------------------------------------------------------
 
-    def set_command(self, v: float, omega: float) -> None:
+    def set_command(self, v: float, omega: float, side: float = 0.0) -> None:
         """Ask the robot for a twist, m/s and rad/s; it is clipped and ramped (``DriveConfig``)."""
-        self._drive.command(v, omega)
+        self._drive.command(v, omega, side)
 
     def carry(self, pose: Sequence[float] | Float) -> None:
         """Put the robot at (x m, y m, heading rad), at rest; its wheels roll nothing on the way."""
@@ -270,20 +269,16 @@ class World:
         return self.bodies.robot_pose(self.data)
 
     def read_robot(self, pose: Float, travel: Float) -> None:
-        """``robot_pose`` and ``wheel_angles`` into (3,) and (2,) arrays."""
+        """``robot_pose`` and ``wheel_angles`` and the way to the left into (3,) arrays."""
         self.bodies.read_robot(self.data, self._drive.state, pose, travel)
 
     def wheel_angles(self) -> Float:
         """(2,) m truly rolled by the left and the right wheel since the start."""
-        return self._drive.travel_m
+        return self._drive.travel_m[:2]
 
     def take_contacts(self) -> list[Contact]:
         """What the robot has touched since the last call, hardest first (``Contact.hard``)."""
         return self._contacts.take()
-
-    def robot_clearance(self) -> float:
-        """m from the robot's rim to the nearest static obstacle or floor edge; < 0: inside."""
-        return self.bodies.clearance(self.data)
 
     # -- everything that moves --------------------------------------------------------------
 
@@ -316,11 +311,6 @@ class World:
         moving = self.mover_speeds() > MOVING_SPEED
         moving[self._people_rows] |= self.people.swinging()
         return moving
-
-    def moving_bodies(self) -> NDArray[np.bool_]:
-        """(nbody,) True for each body of the model that belongs to a moving mover."""
-        moving = np.append(self.movers_moving(), False)
-        return moving[self.bodies.mover_of_body]
 
     # -- state ------------------------------------------------------------------------------
 

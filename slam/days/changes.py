@@ -16,10 +16,25 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.days.config import ChangeConfig, DaysConfig
 from slam.days.evidence import Snapshot
 from slam.days.history import History, dense
 from slam.frames import Float
+
+# What counts as changed between two sessions; all set by hand.
+STANDS = 0.4  # share of the looks that found it: something stands
+EMPTY = 0.1  # share of the looks that found it: nothing stands
+REST = 0.3  # ratio to the other session's share, at most: it went
+FAINT = 0.15  # share that something has where it is thin, as a leg
+JOIN_M = 0.25  # m; cells nearer than this are one object
+SLACK_M = 0.2  # m; an edge that moved by less has not moved
+LEG_M = 0.3  # m; a smaller part may be a leg of a thing
+THING_M = 0.7  # m; legs within this are of one thing
+LEAST = 0.53  # confidence; what is less sure is not listed
+MOVED_M = 1.0  # m, farthest that a thing is followed to another place
+ALIKE = 0.6  # ratio of the smaller to the larger size: may be the same thing
+LEAF_LEAST_M, LEAF_MOST_M = 0.55, 1.3  # m, shortest and longest leaf of a door
+LEAF_THICK = 0.55  # share of its length: a thicker piece is no leaf
+HINGE_M = 0.6  # m, farthest that the ends of a leaf's two places lie apart
 
 KINDS = ("appeared", "gone", "moved", "door")
 
@@ -72,18 +87,15 @@ class _Part:
         return np.asarray(self.points.mean(axis=0))
 
 
-def between(
-    before: Snapshot, after: Snapshot, cell_m: float, config: ChangeConfig | None = None
-) -> list[Change]:
+def between(before: Snapshot, after: Snapshot, cell_m: float) -> list[Change]:
     """The changes from one session to a later one, the surest first."""
-    config = config or DaysConfig().change
     if not len(before.cells) or not len(after.cells):
         return []
     cells, shares = History(cell_m=cell_m, sessions=(before, after)).table()
     low, (old, new) = dense(cells, shares)
-    gone = _pieces(old, new, low, cell_m, config)
-    come = _pieces(new, old, low, cell_m, config)
-    found = [*_doors(gone, come, config), *_moved(gone, come, config)]
+    gone = _pieces(old, new, low, cell_m)
+    come = _pieces(new, old, low, cell_m)
+    found = [*_doors(gone, come), *_moved(gone, come)]
     for kind, rest in (("gone", gone), ("appeared", come)):
         found += [
             Change(
@@ -103,12 +115,11 @@ def _pieces(
     other: NDArray[np.float32],
     low: NDArray[np.int64],
     cell_m: float,
-    config: ChangeConfig,
 ) -> list[_Piece]:
     """What stands in one image where the other is empty, joined to pieces."""
-    changed = _changed(there, other, cell_m, config).astype(np.uint8)
-    joined = _grown(changed > 0, 0.5 * config.join_m / cell_m).astype(np.uint8)
-    known = _known_around(there, other, config.slack_m / cell_m)
+    changed = _changed(there, other, cell_m).astype(np.uint8)
+    joined = _grown(changed > 0, 0.5 * JOIN_M / cell_m).astype(np.uint8)
+    known = _known_around(there, other, SLACK_M / cell_m)
     count, labels = cv2.connectedComponents(joined, connectivity=8)
     parts = []
     for label in range(1, count):
@@ -116,23 +127,23 @@ def _pieces(
         points: Float = (np.stack([i, j], axis=1) + low).astype(np.float64) * cell_m + 0.5 * cell_m
         clear = (there[j, i] - other[j, i]) * known[j, i]
         parts.append(_Part(points=points, clear=clear.astype(np.float64)))
-    pieces = [_piece(part, cell_m) for part in _legs_joined(parts, cell_m, config)]
-    return [piece for piece in pieces if piece.confidence >= config.least]
+    pieces = [_piece(part, cell_m) for part in _legs_joined(parts, cell_m)]
+    return [piece for piece in pieces if piece.confidence >= LEAST]
 
 
 def _changed(
-    there: NDArray[np.float32], other: NDArray[np.float32], cell_m: float, config: ChangeConfig
+    there: NDArray[np.float32], other: NDArray[np.float32], cell_m: float
 ) -> NDArray[np.bool_]:
     """Where something stands in one image, and in the other nothing does.
 
     Beams pass beside what is thin, as the legs of a chair: it has a small share. That counts where
     the other session saw nothing at all around.
     """
-    slack = config.slack_m / cell_m
+    slack = SLACK_M / cell_m
     with np.errstate(invalid="ignore"):
-        went = other <= np.maximum(config.empty, config.rest * there)
-        solid = (there >= config.stands) & went & ~_grown(other >= config.stands, slack)
-        thin = (there >= config.faint) & ~np.isnan(other) & ~_grown(other > config.empty, slack)
+        went = other <= np.maximum(EMPTY, REST * there)
+        solid = (there >= STANDS) & went & ~_grown(other >= STANDS, slack)
+        thin = (there >= FAINT) & ~np.isnan(other) & ~_grown(other > EMPTY, slack)
     return np.asarray(solid | thin)
 
 
@@ -145,16 +156,16 @@ def _known_around(
     return np.asarray(cv2.blur(both, (side, side), borderType=cv2.BORDER_CONSTANT))
 
 
-def _legs_joined(parts: list[_Part], cell_m: float, config: ChangeConfig) -> list[_Part]:
+def _legs_joined(parts: list[_Part], cell_m: float) -> list[_Part]:
     """Small parts, as the legs of a chair are, joined while they fit into one thing."""
-    small = [p for p in parts if _extent(p.points, cell_m) <= config.leg_m]
-    joined = [p for p in parts if _extent(p.points, cell_m) > config.leg_m]
+    small = [p for p in parts if _extent(p.points, cell_m) <= LEG_M]
+    joined = [p for p in parts if _extent(p.points, cell_m) > LEG_M]
     while small:
         one = small.pop(0)
         nearest = sorted(small, key=lambda p: float(np.linalg.norm(p.middle - one.middle)))
         for other in nearest:
             both = np.concatenate([one.points, other.points])
-            if _extent(both, cell_m) <= config.thing_m:
+            if _extent(both, cell_m) <= THING_M:
                 one = _Part(points=both, clear=np.concatenate([one.clear, other.clear]))
                 small.remove(other)
         joined.append(one)
@@ -193,12 +204,12 @@ def _piece(part: _Part, cell_m: float) -> _Piece:
     )
 
 
-def _doors(gone: list[_Piece], come: list[_Piece], config: ChangeConfig) -> list[Change]:
+def _doors(gone: list[_Piece], come: list[_Piece]) -> list[Change]:
     """Thin pieces of a leaf's length that share an end; they are taken off both lists."""
     found = []
     for old in list(gone):
         for new in list(come):
-            hinge = _hinge(old, new, config)
+            hinge = _hinge(old, new)
             if hinge is None:
                 continue
             (x, y), turned, length = hinge
@@ -218,23 +229,21 @@ def _doors(gone: list[_Piece], come: list[_Piece], config: ChangeConfig) -> list
     return found
 
 
-def _hinge(
-    old: _Piece, new: _Piece, config: ChangeConfig
-) -> tuple[tuple[float, float], float, float] | None:
+def _hinge(old: _Piece, new: _Piece) -> tuple[tuple[float, float], float, float] | None:
     """Where two leaves' lines meet, the angle between them, and the leaf's length, m.
 
     None where they are no door. Next to the hinge the two overlap, so neither piece reaches it.
     """
-    if any(p.thick_m > config.leaf_thick * p.size_m for p in (old, new)):
+    if any(p.thick_m > LEAF_THICK * p.size_m for p in (old, new)):
         return None
     apart = np.linalg.norm(old.ends[:, None] - new.ends[None], axis=2)
     a, b = np.unravel_index(int(np.argmin(apart)), apart.shape)
-    if apart[a, b] > config.hinge_m:
+    if apart[a, b] > HINGE_M:
         return None
-    hinge = _meeting(old.ends[[a, 1 - a]], new.ends[[b, 1 - b]], config.hinge_m)
+    hinge = _meeting(old.ends[[a, 1 - a]], new.ends[[b, 1 - b]], HINGE_M)
     first, second = old.ends[1 - a] - hinge, new.ends[1 - b] - hinge
     length = 0.5 * float(np.linalg.norm(first) + np.linalg.norm(second))
-    if not config.leaf_least_m <= length <= config.leaf_most_m:
+    if not LEAF_LEAST_M <= length <= LEAF_MOST_M:
         return None
     cross = float(first[0] * second[1] - first[1] * second[0])
     return _point(hinge), math.atan2(cross, float(first @ second)), length
@@ -253,17 +262,17 @@ def _meeting(old: Float, new: Float, near_m: float) -> Float:
     return np.asarray(met) if far <= near_m else between_ends
 
 
-def _moved(gone: list[_Piece], come: list[_Piece], config: ChangeConfig) -> list[Change]:
+def _moved(gone: list[_Piece], come: list[_Piece]) -> list[Change]:
     """Pairs of about one size, the nearest first; they are taken off both lists."""
     pairs = sorted(
         (float(np.linalg.norm(old.centre - new.centre)), a, b)
         for a, old in enumerate(gone)
         for b, new in enumerate(come)
-        if min(old.size_m, new.size_m) >= config.alike * max(old.size_m, new.size_m)
+        if min(old.size_m, new.size_m) >= ALIKE * max(old.size_m, new.size_m)
     )
     found, left, right = [], dict(enumerate(gone)), dict(enumerate(come))
     for apart, a, b in pairs:
-        if apart > config.moved_m or a not in left or b not in right:
+        if apart > MOVED_M or a not in left or b not in right:
             continue
         old, new = left.pop(a), right.pop(b)
         found.append(

@@ -15,11 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam.days.config import DaysConfig, EvidenceConfig
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float, Frame
 from slam.scan_points import deskewed
 
+CELL_M = 0.1  # m, edge of a place; set by hand
+EVERY_S = 0.2  # s, between two scans that are counted; set by hand
+RANGE_M = 8.0  # m, farthest return that is counted; set by hand
+MARGIN_M = 0.15  # m, before a return that is not yet known to be empty; set by hand
+LEAST_LOOKS = 5  # scans; a place seen less often stays unknown; set by hand
 _TILE = 128  # places along a tile's edge
 _FIXED = 4  # bits behind the point in the corners that OpenCV fills
 
@@ -53,8 +57,11 @@ class Snapshot:
 class SessionGrid:
     """Counts looks while a session goes on."""
 
-    def __init__(self, config: EvidenceConfig | None = None) -> None:
-        self.config = config or DaysConfig().evidence
+    def __init__(
+        self, cell_m: float = CELL_M, every_s: float = EVERY_S, least_looks: int = LEAST_LOOKS
+    ) -> None:
+        self._cell_m, self._every_ns = cell_m, round(every_s * NS_PER_S)
+        self._least_looks = least_looks
         self._tiles: dict[tuple[int, int], NDArray[np.float32]] = {}
         self._last_ns: int | None = None
         self.scans = 0
@@ -62,7 +69,7 @@ class SessionGrid:
     def due(self, stamp_ns: int) -> bool:
         """Whether a scan of this stamp is to be counted."""
         last = self._last_ns
-        return last is None or stamp_ns - last >= round(self.config.every_s * NS_PER_S)
+        return last is None or stamp_ns - last >= self._every_ns
 
     def add(self, frame: Frame, T_map_robot: Float) -> bool:
         """Count what ``frame`` saw from there; False for one too soon after the last, or blind."""
@@ -77,8 +84,8 @@ class SessionGrid:
             return False
         self._last_ns = frame.stamp_ns
         self.scans += 1
-        near = ends[ranges <= self.config.range_m]
-        seen = np.minimum(ranges, self.config.range_m) - self.config.margin_m
+        near = ends[ranges <= RANGE_M]
+        seen = np.minimum(ranges, RANGE_M) - MARGIN_M
         share = np.maximum(seen, 0.0) / np.maximum(ranges, 1e-9)
         rim = T_map_laser[:2] + away * share[:, None]
         self._count(near, np.vstack([T_map_laser[None, :2], rim]))
@@ -86,7 +93,7 @@ class SessionGrid:
 
     def _count(self, hits: Float, outline: Float) -> None:
         """One look: the places of ``hits`` are taken, others within ``outline`` empty."""
-        cell = self.config.cell_m
+        cell = self._cell_m
         everything = np.vstack([hits, outline])
         low = np.floor(everything.min(axis=0) / cell).astype(int) - 1
         size = np.floor(everything.max(axis=0) / cell).astype(int) + 2 - low
@@ -123,7 +130,7 @@ class SessionGrid:
         cells, shares = [np.zeros((0, 2), np.int32)], [np.zeros(0, np.float32)]
         for (row, column), (hits, passes) in sorted(self._tiles.items()):
             looks = hits + passes
-            j, i = np.nonzero(looks >= self.config.least_looks)
+            j, i = np.nonzero(looks >= self._least_looks)
             corner = np.array([column, row]) * _TILE
             cells.append((np.stack([i, j], axis=1) + corner).astype(np.int32))
             shares.append((hits[j, i] / looks[j, i]).astype(np.float32))

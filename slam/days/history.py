@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The sessions of a building, place by place: what a map of days knows beside the map itself."""
+"""The sessions of a building, place by place, and what a scan shows that they do not know.
+
+``News``: a return counts where nothing stood when the place was last seen; a beam counts that goes
+through a place where something stood then. Each place is news for ``NEWS_S``. Then the map has
+learnt it.
+"""
 
 from __future__ import annotations
 
@@ -9,13 +14,15 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.days.config import DaysConfig
+from slam import se2
 from slam.days.evidence import Snapshot
 from slam.errors import InvalidValueError, LogFormatError
-from slam.frames import Float
+from slam.frames import NS_PER_S, Float, Frame
+from slam.scan_points import deskewed
 
 UNSEEN, LEVELS = 0, 254  # bytes of a share: 0 unseen, 1 to 255 for 0 to 1
 NAMES = ("day_cell_m", "day_times_s", "day_cells", "day_standing")
@@ -23,6 +30,14 @@ FARTHEST = 1 << 24  # places from the origin
 WIDEST = 1 << 26  # places in the rectangle around all, which is held whole: 820 m square of 10 cm
 MOST_SESSIONS, MOST_TIME_S = 1000, 1e12
 DAY_S = 86_400.0
+SESSIONS = 64  # kept in a map file; older ones go; set by hand
+STOOD = 0.5  # share of the looks, when last seen: something stood; set by hand
+EMPTY = 0.05  # share of the looks, around it too: nothing stood; set by hand
+SLACK = 1  # places, that an edge may be off by; set by hand
+BEYOND_M = 0.3  # m, that a beam must go past a place where something stood; set by hand
+ASKED_M = 8.0  # m, farthest place that is asked; set by hand
+REACH = 4  # places, to others that are of the same thing; set by hand
+NEWS_S = 2.0  # s after its first scan; then the map has learnt it; set by hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -35,7 +50,7 @@ class History:
     def __len__(self) -> int:
         return len(self.sessions)
 
-    def with_session(self, snapshot: Snapshot, most: int | None = None) -> History:
+    def with_session(self, snapshot: Snapshot, most: int = SESSIONS) -> History:
         """One more; of more than ``most`` the oldest go.
 
         Raises ``InvalidValueError`` for one that is not later than the last: the same session
@@ -46,7 +61,6 @@ class History:
                 f"a session must begin after the last one of the map, at "
                 f"{self.sessions[-1].time_s:.15g} s, got {snapshot.time_s:.15g} s"
             )
-        most = DaysConfig().evidence.sessions if most is None else most
         return replace(self, sessions=(*self.sessions, snapshot)[-most:])
 
     @property
@@ -137,3 +151,96 @@ def dense(
 def hour_of(time_s: Float | float) -> Float:
     """Hour of the day in [0, 24)."""
     return np.asarray(np.mod(time_s, DAY_S) / 3600.0, dtype=np.float64)
+
+
+_NEVER = np.iinfo(np.int64).max
+
+
+class News:
+    """Holds each scan of a session against what the days before saw last of each place."""
+
+    def __init__(self, history: History) -> None:
+        self.cell_m = history.cell_m
+        cells, last = _last_seen(history)
+        stood = last >= STOOD
+        self._low = np.zeros(2, np.int64)
+        self._empty: NDArray[np.bool_] = np.zeros((0, 0), np.bool_)
+        if len(cells):
+            self._low, (image,) = dense(cells, last)
+            side = np.ones((2 * SLACK + 1,) * 2, np.uint8)
+            near = cv2.dilate(np.nan_to_num(image), side)
+            self._empty = ~np.isnan(image) & (near <= EMPTY)
+        self._stood = cells[stood] - self._low
+        self._stood_at: Float = np.asarray((cells[stood] + 0.5) * self.cell_m, dtype=np.float64)
+        self._since_ns: NDArray[np.int64] = np.full(self._empty.shape, _NEVER, np.int64)
+
+    @property
+    def known(self) -> bool:
+        """Whether there is anything to hold a scan against."""
+        return bool(self._empty.size)
+
+    def share(self, frame: Frame, T_map_robot: Float) -> float:
+        """Of the returns of a scan, those that tell news; 0 without any return."""
+        if frame.scan is None or not self.known:
+            return 0.0
+        ends = se2.transform(T_map_robot, deskewed(frame))
+        if len(ends) < 2:
+            return 0.0
+        eye = se2.compose(T_map_robot, frame.scan.spec.T_robot_laser)[:2]
+        beams, places = self._came(ends)
+        passing, left = self._went(eye, ends)
+        beams, places = np.concatenate([beams, passing]), np.concatenate([places, left])
+        since = self._since_ns[places[:, 1], places[:, 0]]
+        self._note(places[since == _NEVER], frame.stamp_ns)
+        new = frame.stamp_ns - np.minimum(since, frame.stamp_ns) <= NEWS_S * NS_PER_S
+        told = np.zeros(len(ends), np.bool_)
+        told[beams[new]] = True
+        return float(told.mean())
+
+    def _note(self, places: NDArray[np.int64], now_ns: int) -> None:
+        """From now on these places are news, and those so near that they are of one thing."""
+        for i, j in places.tolist():
+            rows, columns = (slice(max(at - REACH, 0), at + REACH + 1) for at in (j, i))
+            around = self._since_ns[rows, columns]
+            np.minimum(around, now_ns, out=around)
+
+    def _came(self, ends: Float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Returns (n,) that lie where nothing was, and their places (n, 2)."""
+        at = np.floor(ends / self.cell_m).astype(np.int64) - self._low
+        height, width = self._empty.shape
+        inside = np.flatnonzero((at >= 0).all(axis=1) & (at < (width, height)).all(axis=1))
+        new = inside[self._empty[at[inside, 1], at[inside, 0]]]
+        return new, at[new]
+
+    def _went(self, eye: Float, ends: Float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+        """Beams (n,) that pass through a place where something stood, and those places (n, 2)."""
+        away = ends - eye
+        bearings = np.arctan2(away[:, 1], away[:, 0])
+        order = np.argsort(bearings, kind="stable")
+        turns = np.repeat((-2.0 * math.pi, 0.0, 2.0 * math.pi), len(order))
+        order = np.tile(order, 3)  # a place behind, at +-pi, has beams at both ends
+        bearings = bearings[order] + turns
+        ranges = np.hypot(away[order, 0], away[order, 1])
+        to = self._stood_at - eye
+        far = np.hypot(to[:, 0], to[:, 1])
+        near = np.flatnonzero((far < ASKED_M) & (far > self.cell_m))
+        to, far = to[near], far[near]
+        middle = np.arctan2(to[:, 1], to[:, 0])
+        first = np.searchsorted(bearings, middle - 0.5 * self.cell_m / far)
+        last = np.searchsorted(bearings, middle + 0.5 * self.cell_m / far)
+        beams, places = [np.zeros(0, np.int64)], [np.zeros((0, 2), np.int64)]
+        least = far + BEYOND_M
+        for k in np.flatnonzero(last > first).tolist():
+            if ranges[first[k] : last[k]].min() > least[k]:
+                beams.append(order[first[k] : last[k]])
+                places.append(np.repeat(self._stood[near[k]][None], last[k] - first[k], axis=0))
+        return np.concatenate(beams), np.concatenate(places)
+
+
+def _last_seen(history: History) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    """Places (n, 2), and the share of each when a session saw it last."""
+    cells, values = history.table()
+    last = np.full(len(cells), np.nan, np.float32)
+    for row in values:
+        last = np.where(np.isnan(row), last, row)
+    return cells, last

@@ -1,22 +1,30 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where in the map of the days before a session starts.
+"""Where in the map of the days before a session starts, and whether what it saw fits those days.
 
 The robot maps on its own, in a frame that begins where it stands, while the known map is searched
 for what it sees. Each place that is found is followed, and weighed as a robot that was carried
 weighs places (``slam.tracker.belief``): by what all scans since the start confirm of the long-known
 map and what they see through. Nothing is written to the known map meanwhile.
+
+A session fits the days before where what always stands stands again: of the places where something
+stood in nearly every session before and that this one looked at, the share that it found empty; of
+those where it found something and the sessions before had a say, the share that was never taken.
+Chairs and doors make few of both, a wrong place makes many.
 """
 
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 
+import cv2
 import numpy as np
+from numpy.typing import NDArray
 
 from slam import se2
-from slam.days.agreement import Agreement, Past, Trial
-from slam.days.config import DaysConfig
+from slam.days.evidence import EVERY_S, RANGE_M, SessionGrid, Snapshot
+from slam.days.history import History, dense
 from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
@@ -30,6 +38,111 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
+
+# Finding the start; set by hand.
+STEP_M = 0.02  # m, deviation of the motion between two scans
+STEP_RAD = 0.01  # rad, the same of the turn
+BUFFER = 200  # scans, kept to be merged when the place is found
+BUFFER_M, BUFFER_RAD = 0.1, 0.15  # m driven or rad turned between two of them
+ASKED = 20  # scans of those kept, evenly taken, that a place found late is asked for
+AGREED = 0.75  # share of the usual match, in a map without days, of those asked
+FITS = 0.5  # share of the scans after the find that must be tracked
+# Whether a session fits the days before; set by hand.
+ALWAYS = 0.7  # share of the looks of all sessions: always stands
+STANDS = 0.5  # share of a session's looks: something stands
+EMPTY = 0.2  # share, most of the looks, around it too: nothing
+SLACK = 2  # places, that an edge may be off by
+KNOWN = 120  # places that always stand, looked at: fewer decide nothing
+MORE = 0.045  # share that disagrees at any other place than where it began
+SPOILS = 0.1  # share of a whole session: it is kept apart
+
+
+@dataclass(frozen=True, kw_only=True)
+class Agreement:
+    """Counts of places.
+
+    known, missing  that always stood and were looked at; of these those found empty
+    taken, new      where something was found, of those with a say; of these those always empty
+    """
+
+    known: int = 0
+    missing: int = 0
+    taken: int = 0
+    new: int = 0
+
+    @property
+    def disagrees(self) -> float:
+        """Share of both that do not agree, in [0, 1]; 0 where nothing can be said."""
+        return (self.missing + self.new) / max(self.known + self.taken, 1)
+
+
+class Past:
+    """The sessions of a history as one image of what always stands and what never does."""
+
+    def __init__(self, history: History) -> None:
+        self.cell_m = history.cell_m
+        cells, values = history.table()
+        self._low, self._standing = np.zeros(2, np.int64), np.full((0, 0), np.nan, np.float32)
+        if len(cells):
+            low, (image,) = dense(cells, np.nanmean(values, axis=0))
+            self._low = low - SLACK
+            self._standing = np.pad(image, SLACK, constant_values=np.nan)
+        self._near = _highest_near(self._standing, SLACK)
+
+    @property
+    def known(self) -> bool:
+        """Whether there is anything to agree with."""
+        return bool((np.nan_to_num(self._standing) >= ALWAYS).any())
+
+    def agreement(self, snapshot: Snapshot) -> Agreement:
+        """Of what a session saw; on the same places."""
+        standing = self._standing
+        inside = np.all(
+            (snapshot.cells >= self._low) & (snapshot.cells < self._low + standing.shape[::-1]),
+            axis=1,
+        )
+        at = snapshot.cells[inside] - self._low
+        now = np.full(standing.shape, np.nan, np.float32)
+        now[at[:, 1], at[:, 0]] = snapshot.standing[inside]
+        near = _highest_near(now, SLACK)
+        with np.errstate(invalid="ignore"):
+            known = (standing >= ALWAYS) & ~np.isnan(now)
+            taken = (now >= STANDS) & ~np.isnan(standing)
+            return Agreement(
+                known=int(known.sum()),
+                missing=int((known & (near < EMPTY)).sum()),
+                taken=int(taken.sum()),
+                new=int((taken & (self._near < EMPTY)).sum()),
+            )
+
+
+def _highest_near(image: NDArray[np.float32], slack: int) -> NDArray[np.float32]:
+    """The largest share within ``slack`` places along both axes, 0 where nothing is known."""
+    if not image.size:
+        return image
+    side = 2 * slack + 1
+    return np.asarray(cv2.dilate(np.nan_to_num(image), np.ones((side, side), np.uint8)))
+
+
+class Trial:
+    """A place where the session may have begun, and what it saw as seen from there."""
+
+    def __init__(self, past: Past, T_map_own: Float) -> None:
+        self._past, self._T_map_own = past, T_map_own
+        self._grid, self._taken = SessionGrid(past.cell_m, 0.0, 1), 0
+        self._same_rad = SLACK * past.cell_m / RANGE_M
+
+    def is_at(self, T_map_own: Float) -> bool:
+        """Whether that place is the same, as far as the slack of the comparison goes."""
+        x, y, turn = se2.between(self._T_map_own, T_map_own).tolist()
+        return bool(math.hypot(x, y) <= self._past.cell_m and abs(turn) <= self._same_rad)
+
+    def agreement(self, seen: Sequence[tuple[Frame, Float]]) -> Agreement:
+        """Of scans and poses in the session's own frame; only those that were added are new."""
+        for frame, pose in seen[self._taken :]:
+            self._grid.add(frame, se2.compose(self._T_map_own, pose))
+        self._taken = len(seen)
+        return self._past.agreement(self._grid.snapshot(0.0))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -70,9 +183,8 @@ class StartSearch:
     seen   scans to be counted when the place is found, and the poses in the session's own frame
     """
 
-    def __init__(self, known: Tracker, config: DaysConfig, past: Past) -> None:
-        self._known, self._config, self._past = known, config.search, past
-        self._every_ns = round(config.evidence.every_s * NS_PER_S)
+    def __init__(self, known: Tracker, past: Past) -> None:
+        self._known, self._past = known, past
         numbers = known.config
         self._belief, self._budget = numbers.belief, numbers.matching.budget
         changed = replace(numbers.belief, outdated=0.0)  # rooms have, since: all places pay alike
@@ -110,12 +222,12 @@ class StartSearch:
                 self._begin_anew()  # its own map is in doubt
             return estimate, None
         self._keep(observations, pose, elapsed)
-        if not self.seen or now - self.seen[-1][0].stamp_ns >= self._every_ns:
+        if not self.seen or now - self.seen[-1][0].stamp_ns >= round(EVERY_S * NS_PER_S):
             self.seen.append((frame, pose))
         prediction = Prediction(
             T_map_robot=pose,
             increment=se2.between(before, pose),
-            covariance=spread(self._config.step_m, self._config.step_rad),
+            covariance=spread(STEP_M, STEP_RAD),
             twist=np.zeros(3),
             elapsed=elapsed,
         )
@@ -134,12 +246,12 @@ class StartSearch:
         if any(place.is_at(other, config) for other in others):
             return
         T_map_own = se2.compose(place.match.T_map_robot, se2.inverse(pose))
-        unasked = self._kept[:-1][:: max(1, len(self._kept) // self._config.asked)]
+        unasked = self._kept[:-1][:: max(1, len(self._kept) // ASKED)]
         self._late.append(Late(place=place, T_map_own=T_map_own, unasked=unasked))
 
     def _ask(self, pose: Float) -> None:
         """Ask the scans before of the places that were found late, some in each scan."""
-        left = self._config.asked
+        left = ASKED
         while self._late and left > 0:
             late = self._late[0]
             now, late.unasked[-left:] = late.unasked[-left:], []
@@ -158,7 +270,7 @@ class StartSearch:
         best = self._weight(self._places.followed[0])
         if self._weight(late.place) < best - hopeless:
             self._hopeless.append(late.T_map_own)
-            del self._hopeless[: -self._config.buffer]
+            del self._hopeless[:-BUFFER]
 
     def _weight(self, place: Place) -> float:
         """Nats of having begun there, against outside the map; any place of it is as likely."""
@@ -194,12 +306,12 @@ class StartSearch:
         """
         if not self._past.known:
             return self._matches(T_map_own)
-        config, found = self._past.config, self._tried(T_map_own)
-        if found.known < config.known or found.disagrees > config.spoils:
+        found = self._tried(T_map_own)
+        if found.known < KNOWN or found.disagrees > SPOILS:
             return False
-        most = found.disagrees + config.more
+        most = found.disagrees + MORE
         asked = (self._tried(start.T_map_own) for start in self.starts())
-        alike = (o.known >= config.known and o.disagrees <= most for o in asked)
+        alike = (o.known >= KNOWN and o.disagrees <= most for o in asked)
         return sum(alike) == 1  # itself
 
     def _tried(self, T_map_own: Float) -> Agreement:
@@ -212,8 +324,8 @@ class StartSearch:
 
     def _matches(self, T_map_own: Float) -> bool:
         """The same of a map without days: by what of the kept scans the map has."""
-        config, known = self._config, self._known
-        asked = self._kept[:: max(1, len(self._kept) // config.asked)]
+        known = self._known
+        asked = self._kept[:: max(1, len(self._kept) // ASKED)]
         covariance = coarse(known.config.tracking.relocalise)
         shares = [
             known.matched(
@@ -221,7 +333,7 @@ class StartSearch:
             ).overlapped
             for one in asked
         ]
-        return math.fsum(shares) >= config.agreed * known.usual_match * len(asked)
+        return math.fsum(shares) >= AGREED * known.usual_match * len(asked)
 
     @staticmethod
     def _twist(frame: Frame, before: Float, pose: Float, elapsed: float) -> Float:
@@ -234,12 +346,11 @@ class StartSearch:
         self._kept_s += elapsed
         if self._kept:
             x, y, turn = se2.between(self._kept[-1].T_own_robot, pose).tolist()
-            config = self._config
-            if math.hypot(x, y) < config.buffer_m and abs(turn) < config.buffer_rad:
+            if math.hypot(x, y) < BUFFER_M and abs(turn) < BUFFER_RAD:
                 return
         self._kept.append(Kept(observations=observations, T_own_robot=pose, elapsed=self._kept_s))
         self._kept_s = 0.0
-        del self._kept[: -self._config.buffer]
+        del self._kept[:-BUFFER]
         for late in self._late:
             late.unasked.append(self._kept[-1])
 

@@ -16,13 +16,10 @@ from pathlib import Path
 import numpy as np
 
 from slam import se2
-from slam.days.agreement import Agreement, Past
-from slam.days.config import DaysConfig
-from slam.days.evidence import SessionGrid
-from slam.days.history import NAMES, History
-from slam.days.mobility import DaysRaster, MobilityMap
-from slam.days.news import News
-from slam.days.search import StartSearch
+from slam.days.evidence import CELL_M, EVERY_S, SessionGrid
+from slam.days.habits import DaysRaster, MobilityMap
+from slam.days.history import NAMES, History, News
+from slam.days.search import FITS, KNOWN, SPOILS, Agreement, Past, StartSearch
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Changes, Estimate, Raster
 from slam.frames import Float, Frame, to_s
@@ -33,6 +30,7 @@ from slam.tracker.belief.status import Status
 from slam.tracker.tracker import Tracker
 from slam.trajectory import Trajectory
 
+OUTDATED = 0.05  # share of the returns: the map is outdated here; set by hand
 _TRACKED = ("tracking", "relocated", "blind")
 
 
@@ -41,7 +39,6 @@ class SessionState:
     """How a session went so far.
 
     found_after_s   until the start was found; 0 in a new map, None: not found
-    first_found     (3,) pose in the map at that scan; None before
     merged          scans of the search that were merged
     tracked         share of the scans after the find that were tracked
     disagrees       share of what it saw that does not fit the days before (``Agreement``)
@@ -49,7 +46,6 @@ class SessionState:
     """
 
     found_after_s: float | None
-    first_found: Float | None
     merged: int
     tracked: float
     disagrees: float
@@ -74,9 +70,7 @@ class Session:
         time_s: float,
         history: History | None = None,
         found: bool = True,
-        config: DaysConfig | None = None,
     ) -> None:
-        self.config = config or DaysConfig()
         if not math.isfinite(time_s):
             raise InvalidValueError(f"Session.time_s must be finite, got {time_s}")
         if history is not None and len(history) and time_s <= history.times_s[-1]:
@@ -86,33 +80,29 @@ class Session:
             )
         self.tracker, self.time_s = tracker, float(time_s)
         tracker.hold_map()  # what a session keeps of places lies in it
-        self.history = history or History(cell_m=self.config.evidence.cell_m)
+        self.history = history or History(cell_m=CELL_M)
         self._found, self._new = found, found
         self.reset()
 
     @classmethod
-    def open(
-        cls, path: Path, kind: type[Tracker], *, time_s: float, config: DaysConfig | None = None
-    ) -> Session:
+    def open(cls, path: Path, kind: type[Tracker], *, time_s: float) -> Session:
         """A session in the map of a file, its start unknown; ``LogFormatError`` as ``load``.
 
         A map of before days, or one that a single run saved, has no history: it begins here.
         """
         history = read_history(path)
-        return cls(kind.load(path), time_s=time_s, history=history, found=False, config=config)
+        return cls(kind.load(path), time_s=time_s, history=history, found=False)
 
     def reset(self) -> None:
         """Forget this session; a map that was already written to cannot be taken back."""
-        own = replace(self.config.evidence, cell_m=self.history.cell_m)
-        self._grid = SessionGrid(own)
-        self._past = Past(self.history, self.config.agreement)
-        self._news, self._told = News(self.history, self.config.news), 0.0
+        self._grid = SessionGrid(self.history.cell_m)
+        self._past = Past(self.history)
+        self._news, self._told = News(self.history), 0.0
         self._asked_ns: int | None = None
-        self._search = None if self._new else StartSearch(self.tracker, self.config, self._past)
+        self._search = None if self._new else StartSearch(self.tracker, self._past)
         self._path, self._T_map_own = PosePath(), np.zeros(3)
         self._searched = 0  # poses that are in the session's own frame
         self._found_after_s: float | None = 0.0 if self._new else None
-        self._first_found: Float | None = np.zeros(3) if self._new else None
         self._merged = 0
         self._after = self._tracked = 0  # scans since it was found
         self._state, self._lost_s, self._gave_up = "", 0.0, False
@@ -121,7 +111,7 @@ class Session:
     def update(self, frame: Frame) -> Estimate:
         """As a ``SlamSystem``'s. While the start is searched for, poses are in the session's own
         frame, ``converged`` is False and ``diagnostics["state"]`` is "searching". In a map with
-        days, "news" is the share of the returns that they did not know (``slam.days.news``), and
+        days, "news" is the share of the returns that they did not know (``history.News``), and
         "verdict" is "map outdated here" where that is much.
         """
         if self._search is not None:
@@ -149,9 +139,7 @@ class Session:
             self._grid.add(earlier, se2.compose(place, pose))
         numbers = self.tracker.config.tracking.relocalise
         self.tracker.place(se2.compose(place, own), coarse(numbers))
-        estimate = self._go_on(frame)
-        self._first_found = estimate.T_map_robot
-        return estimate
+        return self._go_on(frame)
 
     def _go_on(self, frame: Frame) -> Estimate:
         estimate = self.tracker.update(frame)
@@ -174,14 +162,13 @@ class Session:
         """The estimate with what of the scan is news; asked as often as scans are counted."""
         if not self._news.known:
             return estimate
-        every_s = self.config.evidence.every_s
         if not estimate.converged:
             self._told = 0.0
-        elif self._asked_ns is None or to_s(frame.stamp_ns - self._asked_ns) >= every_s:
+        elif self._asked_ns is None or to_s(frame.stamp_ns - self._asked_ns) >= EVERY_S:
             self._told = self._news.share(frame, estimate.T_map_robot)
             self._asked_ns = frame.stamp_ns
         found = {**estimate.diagnostics, "news": self._told}
-        if found.get("verdict") == Status.TRACKING and self._told >= self.config.news.outdated:
+        if found.get("verdict") == Status.TRACKING and self._told >= OUTDATED:
             found["verdict"] = Status.OUTDATED.value
         return replace(estimate, diagnostics=found)
 
@@ -191,12 +178,11 @@ class Session:
         share = self._tracked / self._after if self._after else 0.0
         ended = self._state in _TRACKED and not self._gave_up
         agreement = self.agreement()
-        known = agreement.known >= self.config.agreement.known
-        denied = known and agreement.disagrees > self.config.agreement.spoils
-        fits = self._search is None and ended and share >= self.config.search.fits and not denied
+        known = agreement.known >= KNOWN
+        rejected = known and agreement.disagrees > SPOILS
+        fits = self._search is None and ended and share >= FITS and not rejected
         return SessionState(
             found_after_s=self._found_after_s,
-            first_found=self._first_found,
             merged=self._merged,
             tracked=share,
             disagrees=agreement.disagrees,
@@ -214,11 +200,11 @@ class Session:
         if self._search is not None or not self._grid.scans:
             return self.history
         snapshot = self._grid.snapshot(self.time_s)
-        return self.history.with_session(snapshot, self.config.evidence.sessions)
+        return self.history.with_session(snapshot)
 
     def mobility(self) -> MobilityMap:
         """How often and how long things stand, by place; this session included."""
-        return MobilityMap(self.known(), self.config.habit)
+        return MobilityMap(self.known())
 
     def map(self) -> Raster | None:
         """The SLAM's map, of the session alone while it is not found; with ``mobility``."""
@@ -274,4 +260,4 @@ def keep(session: Session, path: Path) -> Path:
         if not apart.exists():
             session.save(apart)
             return apart
-    raise InvalidValueError(f"{path}: 999 sessions lie apart from it already")
+    raise InvalidValueError(f"{path}: 999 sessions are kept separately beside it already")

@@ -1,57 +1,33 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Every number of the EKF, and its presets for corners and for Victoria Park."""
+"""What can be set of the EKF, and its presets for corners and for Victoria Park."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from collections.abc import Mapping
+from dataclasses import dataclass
 from typing import Any, ClassVar
 
-from slam.frontend.corner_config import CornerConfig
 from slam.landmarks.hypotheses import Gates
 from slam.settings import Settings, number, word
 
-SEEDS = "training seeds 0-19, tune_ekf (docs/paper/method.md)"
+SEEDS = "training seeds 0-19 (docs/paper/method.md)"
 SENSOR = "as PointWorldConfig, the world of section 4.2"
 MOST_GATE = 1.0 - 1e-12
 
 
 @dataclass(frozen=True, kw_only=True)
-class LifecycleConfig(Settings):
-    """When an object is a landmark, and when it is none any more."""
-
-    chance: float = number(
-        0.05, "prob", "of something else where a landmark was", low=1e-6, high=0.15
-    )
-    within: float = number(0.95, "share", "of range and field of view: surely in view")
-    beyond: float = number(1.1, "share", "of range and field of view: surely not in view", low=1.0)
-    behind_m: float = number(0.15, "m", "a beam that ends so far off a landmark decides")
-    lost_after: int = number(10, "frames", "in a row without an expected match: lost", low=1)
-    singular_m2: float = number(
-        1e-12,
-        "m²",
-        "least eigenvalue of a measured covariance; below, it is replaced",
-        "numerical guard: (1 µm)²",
-        low=1e-18,
-    )
-    least_m2: float = number(
-        1e-6,
-        "m²",
-        "variance taken in the place of a singular one",
-        "numerical guard: (1 mm)²",
-        low=1e-15,
-    )
-    reach_sigmas: float = number(3.0, "σ", "deviations of the pose, for what is in reach")
-
-
-@dataclass(frozen=True, kw_only=True)
 class EkfConfig(Settings):
-    """Everything that can be set; the twelve at the top are the public face.
+    """Everything that can be set.
 
     The gates are wide: the first pairs carry the whole error of the odometry, and a step beyond the
     gate, one of a thousand at 0.999, would be a step without landmarks.
     """
 
     presets: ClassVar[tuple[str, ...]] = ("points", "corners", "victoria_park")
+    constants: ClassVar[Mapping[str, str]] = {
+        "lifecycle": "slam.ekf.slam",
+        "extractor": "slam.frontend.corners",
+    }
 
     association: str = word(
         "ipjc", ("ipjc", "jcbb", "individual"), "IPJC, joint compatibility branch and bound, "
@@ -97,8 +73,6 @@ class EkfConfig(Settings):
     separation_m: float = number(
         0.0, "m", "no new object nearer than this to a known one", SEEDS, high=100.0
     )
-    lifecycle: LifecycleConfig = field(default=LifecycleConfig())
-    extractor: CornerConfig = field(default=CornerConfig())
 
     @property
     def gates(self) -> Gates:

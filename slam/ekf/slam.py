@@ -1,5 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The classification-based EKF-SLAM that the paper compares itself with, as strong as we can."""
+"""The classification-based EKF-SLAM that the paper compares itself with, as strong as we can.
+
+Which objects are landmarks is the classification of the paper's section 4.1: "Every time an object
+was re-observed, it was added as a state variable; landmarks are deleted if they cannot be observed
+again." An object seen once is a *candidate*: it has its rows in the covariance, so that what its
+first observation said is not lost, but nothing is associated with it until all confirmed landmarks
+have had their say. Existence is a log-odds: a look that sees the object adds log(d / c), one that
+should and does not adds log((1 - d) / (1 - c)), with d the probability of detection and c that of
+seeing something else there. At zero the object goes.
+"""
 
 from __future__ import annotations
 
@@ -12,28 +21,125 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam.ekf.config import EkfConfig, LifecycleConfig
-from slam.ekf.lifecycle import (
-    Lifecycle,
-    in_view,
-    unhidden_by_beams,
-    unhidden_by_features,
-)
+from slam.ekf.config import EkfConfig
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate, Landmarks, Raster
-from slam.frames import Features, Float, Frame, Odometry
+from slam.frames import Features, Float, Frame, Odometry, Scan
 from slam.frontend import odometry_steps
-from slam.frontend.corner_config import CornerConfig
-from slam.frontend.corners import corners
+from slam.frontend.corners import answered, corners
 from slam.frontend.odometry_prior import assumed_covariance
-from slam.frontend.polar import polar
+from slam.frontend.polar import hidden, polar
 from slam.landmarks.association import METHODS
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
 from slam.path import PosePath
 from slam.system import register
 from slam.trajectory import Trajectory
 
-GROUPS = ("lifecycle", "extractor")  # set by path, not as options
+CHANCE = 0.05  # probability of something else where a landmark was; set by hand
+WITHIN = 0.95  # share of range and field of view: surely in view
+BEYOND = 1.1  # share of range and field of view: surely not in view
+BEHIND_M = 0.15  # m; a beam that ends so far off a landmark decides
+LOST_AFTER = 10  # frames in a row without an expected match: lost
+SINGULAR_M2 = 1e-12  # m^2, least eigenvalue of a measured covariance; numerical guard: (1 um)^2
+LEAST_M2 = 1e-6  # m^2, variance taken in the place of a singular one: (1 mm)^2
+REACH_SIGMAS = 3.0  # deviations of the pose, for what is in reach
+
+
+class Lifecycle:
+    """What is known of each landmark of the filter, in the filter's order.
+
+    keys       (n,) int64, never used twice: names that outlive deletions
+    looks      (n,) int64 times seen
+    existence  (n,) log-odds
+    """
+
+    def __init__(self, config: EkfConfig) -> None:
+        self._config = config
+        self._seen_adds = math.log(config.detection / CHANCE)
+        self._missed_adds = math.log((1.0 - config.detection) / (1.0 - CHANCE))
+        self._next_key = 0
+        self.keys: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self.looks: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self.existence: Float = np.zeros(0)
+        self.deleted = 0
+
+    @property
+    def confirmed(self) -> NDArray[np.bool_]:
+        """(n,) bool: seen often enough to be a landmark."""
+        return self.looks >= self._config.confirm_looks
+
+    def add(self, n: int) -> None:
+        """n objects seen for the first time, at the end of the order."""
+        self.keys = np.concatenate([self.keys, np.arange(self._next_key, self._next_key + n)])
+        self.looks = np.concatenate([self.looks, np.ones(n, dtype=np.int64)])
+        self.existence = np.concatenate([self.existence, np.full(n, self._seen_adds)])
+        self._next_key += n
+
+    def judge(
+        self,
+        seen: NDArray[np.int64],
+        expected: NDArray[np.bool_],
+        left_behind: NDArray[np.bool_],
+    ) -> NDArray[np.int64]:
+        """Count one frame; the indices that can go.
+
+        expected     (n,) should have been seen
+        left_behind  (n,) out of view: candidates there go, else every thing that ever moved would
+                     stay in the state
+        """
+        missed = expected.copy()
+        missed[seen] = False
+        self.looks[seen] += 1
+        self.existence[seen] += self._seen_adds
+        self.existence[missed] += self._missed_adds
+        ceiling = self._config.memory_looks * self._seen_adds
+        self.existence = np.minimum(self.existence, ceiling)
+        return np.flatnonzero((self.existence <= 0.0) | (left_behind & ~self.confirmed))
+
+    def remove(self, gone: NDArray[np.int64]) -> None:
+        """Forget these; counts how many of them were confirmed."""
+        self.deleted += int(self.confirmed[gone].sum())
+        self.keys = np.delete(self.keys, gone)
+        self.looks = np.delete(self.looks, gone)
+        self.existence = np.delete(self.existence, gone)
+
+
+def in_view(landmarks_robot: Float, config: EkfConfig, rim: float = WITHIN) -> NDArray[np.bool_]:
+    """(n,) landmarks (n, 2), robot frame, within the share ``rim`` of range and field of view."""
+    distance, bearing = polar(landmarks_robot)
+    half = math.radians(config.fov_deg) / 2.0
+    inside: NDArray[np.bool_] = (np.abs(bearing) < rim * half) | (config.fov_deg >= 360.0)
+    return inside & (distance < rim * config.range_m)
+
+
+def unhidden_by_features(
+    landmarks_robot: Float, points_robot: Float, config: EkfConfig
+) -> NDArray[np.bool_]:
+    """(n,) False where an observed thing stands before the landmark: within the angle that
+    ``occluder_m`` fills at its distance, and nearer than the landmark by as much."""
+    if config.occluder_m == 0.0:
+        return np.ones(len(landmarks_robot), dtype=np.bool_)
+    return ~hidden(landmarks_robot, points_robot, config.occluder_m)
+
+
+def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
+    """(n,) True where every beam at the landmark (laser frame) passes beyond it: it is gone.
+
+    A beam that ends before it says that it is hidden; one that ends at it, that something is there
+    although no feature was found. Neither is a miss. Takes the three beams nearest in direction.
+    """
+    spec = scan.spec
+    distance, bearing = polar(landmarks_laser)
+    beam = np.round((bearing - spec.angle_min) / spec.angle_increment).astype(np.int64)
+    inside = (beam >= 1) & (beam < spec.n_beams - 1)
+    beam = np.clip(beam, 1, max(spec.n_beams - 2, 1))
+    ranges = answered(scan)
+    if spec.n_beams < 3:
+        return np.zeros(len(landmarks_laser), dtype=np.bool_)
+    shortest = np.minimum(np.minimum(ranges[beam - 1], ranges[beam]), ranges[beam + 1])
+    return inside & (shortest > distance + BEHIND_M)
+
+
 PRESETS: dict[str, Callable[..., EkfConfig]] = {
     name: getattr(EkfConfig, name) for name in EkfConfig.presets
 }
@@ -70,7 +176,6 @@ class EkfSlam:
         config: EkfConfig | Mapping[str, Any] | None = None,
         *,
         preset: str | None = None,
-        corner_config: CornerConfig | None = None,
         **options: Any,
     ) -> None:
         self._changes = dict(config) if isinstance(config, Mapping) else {}
@@ -80,13 +185,12 @@ class EkfSlam:
             raise InvalidValueError(f"EkfSlam.preset must be of {list(PRESETS)}, got {preset!r}")
         if config is not None and (preset is not None or options):
             raise InvalidValueError("EkfSlam takes a config, or a preset and options, not both")
-        known = [name for name in EkfConfig.__dataclass_fields__ if name not in GROUPS]
+        known = list(EkfConfig.__dataclass_fields__)
         unknown = sorted(set(options) - set(known))
         if unknown:
             raise InvalidValueError(f"EkfSlam has no option {unknown[0]!r}; it has {known}")
         self._options = options
         self._is_given = config is not None or preset is not None
-        self._corner_config = corner_config
         self._configure(config or PRESETS[preset or "points"](**options))
         self.reset()
 
@@ -127,10 +231,7 @@ class EkfSlam:
         if features is None:
             if frame.scan is None:
                 raise InvalidValueError("the EKF needs a scan or features in every frame")
-            twist = frame.odometry.twist
-            features = corners(
-                frame.scan, twist=twist, config=self._corner_config or self.config.extractor
-            )
+            features = corners(frame.scan, twist=frame.odometry.twist)
         return self._used(features)
 
     def _used(self, features: Features) -> tuple[Float, Float]:
@@ -143,10 +244,8 @@ class EkfSlam:
         variances = features.covariances.diagonal(axis1=1, axis2=2)
         used &= variances.max(axis=1, initial=0.0) <= MOST_STD_M**2
         if config.fov_deg < 360.0:
-            used &= np.abs(bearing) < config.lifecycle.beyond * math.radians(config.fov_deg) / 2.0
-        return points[used], _regular(
-            features.covariances[used] * config.noise_scale**2, config.lifecycle
-        )
+            used &= np.abs(bearing) < BEYOND * math.radians(config.fov_deg) / 2.0
+        return points[used], _regular(features.covariances[used] * config.noise_scale**2)
 
     def _predict(self, odometry: Odometry) -> None:
         if self._before is not None:
@@ -177,9 +276,9 @@ class EkfSlam:
 
     def _within_reach(self, chosen: NDArray[np.int64]) -> NDArray[np.bool_]:
         """What could be seen if the pose is off by three standard deviations."""
-        P, sigmas = self.filter.pose_covariance(), self.config.lifecycle.reach_sigmas
-        reach = self.config.range_m * (1.0 + sigmas * math.sqrt(max(P[2, 2], 0.0)))
-        reach += sigmas * math.sqrt(max(P[0, 0] + P[1, 1], 0.0))
+        P = self.filter.pose_covariance()
+        reach = self.config.range_m * (1.0 + REACH_SIGMAS * math.sqrt(max(P[2, 2], 0.0)))
+        reach += REACH_SIGMAS * math.sqrt(max(P[0, 0] + P[1, 1], 0.0))
         away = self.filter.landmarks[chosen] - self.filter.pose[:2]
         near: NDArray[np.bool_] = polar(away)[0] < reach
         return near
@@ -192,7 +291,7 @@ class EkfSlam:
         if frame.features is None and frame.scan is not None:
             T_laser_robot = se2.inverse(frame.scan.spec.T_robot_laser)
             landmarks_laser = se2.transform(T_laser_robot, landmarks_robot)
-            return expected & unhidden_by_beams(landmarks_laser, frame.scan, self.config)
+            return expected & unhidden_by_beams(landmarks_laser, frame.scan)
         return expected & unhidden_by_features(landmarks_robot, points, self.config)
 
     def _judge(
@@ -205,7 +304,7 @@ class EkfSlam:
             self._unmatched += 1
         seen = pairs.landmarks[pairs.landmarks >= 0]
         landmarks_robot = se2.transform(se2.inverse(self.filter.pose), self.filter.landmarks)
-        left_behind = ~in_view(landmarks_robot, self.config, self.config.lifecycle.beyond)
+        left_behind = ~in_view(landmarks_robot, self.config, BEYOND)
         gone = self.lifecycle.judge(seen, expected, left_behind)
         self.lifecycle.remove(gone)
         self.filter.remove(gone)
@@ -223,7 +322,7 @@ class EkfSlam:
         self.lifecycle.add(len(new))
 
     def _report(self, frame: Frame, matched: int, observed: int) -> Estimate:
-        lost = self._unmatched >= self.config.lifecycle.lost_after
+        lost = self._unmatched >= LOST_AFTER
         self._path.add(frame.stamp_ns, self.filter.pose)
         return Estimate(
             stamp_ns=frame.stamp_ns,
@@ -258,13 +357,13 @@ class EkfSlam:
         return self._path.trajectory()
 
 
-def _regular(covariances: Float, config: LifecycleConfig) -> Float:
+def _regular(covariances: Float) -> Float:
     """(k, 2, 2) with more on the diagonal where they are singular, the others bit for bit: exact
     features, or features exact in one direction, must not end a run."""
     xx, yy, xy = covariances[:, 0, 0], covariances[:, 1, 1], covariances[:, 0, 1]
     half, apart = 0.5 * (xx + yy), 0.5 * (xx - yy)
     scale = np.maximum(half, 1.0)
-    flat = half - np.sqrt(apart * apart + xy * xy) < config.singular_m2 * scale
+    flat = half - np.sqrt(apart * apart + xy * xy) < SINGULAR_M2 * scale
     out = covariances.copy()
-    out[flat] += config.least_m2 * scale[flat, None, None] * np.eye(2)
+    out[flat] += LEAST_M2 * scale[flat, None, None] * np.eye(2)
     return out

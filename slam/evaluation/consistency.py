@@ -125,7 +125,7 @@ def _near(one: Float, other: Float) -> bool:
 
 
 def _revisits(keys: Float) -> list[tuple[int, int]]:
-    """Each key pose with the nearest one of an earlier passage."""
+    """Each key pose with the nearest one of an earlier visit."""
     way = np.concatenate([[0.0], np.hypot(*np.diff(keys[:, :2], axis=0).T).cumsum()])
     tree, pairs = cKDTree(keys[:, :2]), []
     for b in range(len(keys)):

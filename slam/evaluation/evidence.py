@@ -2,7 +2,7 @@
 """Which places of a log stand: cells that scans hit, and cells that scans look through.
 
 Scans are laid over each other at given poses. Neighbouring returns on one surface are joined, so
-that a wall far away is a line and no dots.
+that a wall far away is a line and no dots. ``beside`` puts a log and its twin scan beside scan.
 """
 
 from __future__ import annotations
@@ -10,6 +10,7 @@ from __future__ import annotations
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam._jit import njit
 from slam.errors import InvalidValueError
-from slam.frames import Float, Scan
+from slam.frames import Float, Frame, Scan
 from slam.system import Raster
 
 CELL_M = 0.05  # of a plan: a wall is two to four cells thick
@@ -140,3 +141,60 @@ def _add(  # noqa: PLR0913 (kernel)
             if marks[i, j] < mark:
                 marks[i, j] = mark
                 through[i, j] += 1
+
+
+NEAR_M = (0.05, 0.10)  # beams nearer than that agree
+
+
+@dataclass(frozen=True, kw_only=True, eq=False)
+class Beside:
+    """Of all n beams of the log that have a return.
+
+    points   (n, 2) m, where the log's return lies
+    apart    (n,) m, the twin's range less the log's; inf where the twin has no return
+    stands   (n,) whether other scans of the log say that what is there stands
+    """
+
+    points: Float
+    apart: Float
+    stands: NDArray[np.bool_]
+
+    def words(self) -> dict[str, Any]:
+        """Medians and shares: of all beams, of those on what stands, and of the others."""
+        of = {"all": np.ones_like(self.stands), "stands": self.stands, "changed": ~self.stands}
+        return {name: self._part(chosen) for name, chosen in of.items()}
+
+    def _part(self, chosen: NDArray[np.bool_]) -> dict[str, Any]:
+        apart = np.abs(self.apart[chosen])
+        if not len(apart):
+            return {"beams": 0}
+        within = {f"within_{100 * m:.0f}_cm": round(float((apart <= m).mean()), 4) for m in NEAR_M}
+        return {
+            "beams": len(apart),
+            "median_m": round(float(np.median(apart)), 4),
+            "nearer_m": round(float(np.median(self.apart[chosen])), 4),
+            **within,
+        }
+
+
+def beside(log: Iterable[Frame], twin: Iterable[Frame], poses: Float) -> Beside:
+    """Of frames at the same poses of the robot, (n, 3) in the frame of the building."""
+    frames = list(log)
+    scans = [frame.scan for frame in frames if frame.scan is not None]
+    coarse = evidence_of(scans, poses, COARSE_M)
+    points, apart, stands = [], [], []
+    for ours, theirs, pose in zip(scans, twin, poses, strict=True):
+        if theirs.scan is None:
+            continue
+        laser = se2.compose(pose, ours.spec.T_robot_laser)
+        valid, heading = ours.valid, laser[2] + ours.spec.angles
+        ranges = ours.ranges[valid].astype(np.float64)
+        x = laser[0] + ranges * np.cos(heading[valid])
+        y = laser[1] + ranges * np.sin(heading[valid])
+        points.append(np.column_stack([x, y]))
+        seen = np.where(theirs.scan.valid, theirs.scan.ranges, np.inf)[valid]
+        apart.append(seen - ranges)
+        stands.append(coarse.stands(points[-1]))
+    return Beside(
+        points=np.concatenate(points), apart=np.concatenate(apart), stands=np.concatenate(stands)
+    )

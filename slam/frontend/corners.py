@@ -16,55 +16,175 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
+from slam._jit import inner, njit
 from slam.frames import Features, Float, Scan
-from slam.frontend import corner_image
-from slam.frontend.corner_config import CornerConfig
 from slam.frontend.deskew import end_points
+
+Bools = NDArray[np.bool_]
+
+CELL_M = 0.04  # m, edge of a pixel of the image into which a scan is drawn
+RANGE_M = 12.0  # m; returns beyond are not drawn
+RESPONSE = 0.25  # least corner response, over that of a lone thin post
+NOISE_M = 0.01  # m, deviation of a range
+FLOOR_M = 0.015  # m, least deviation: round things shift with the viewpoint
+GRAZING_DEG = 10.0  # flattest view at which hits are one surface; breakpoint, Borges and Aldon 2004
+FLAT_DEG = 12.0  # flattest angle of view at which the end of a surface is a corner
+FAILED = 2  # beams in a row that may have failed inside a surface
+BLOCK = 5  # pixels, edge of the window over which gradients are summed; Kanade and Tomasi
+IDEAL = 0.14  # corner response to one dot of 1.2 cells; measured, block of 5
+MIN_SIGMA_CELLS = 1.2  # cells, least width of a drawn dot
+WINDOW = 4  # cells, half width of the window that refines a corner
+PEAK_CELLS = 4  # cells, least distance between two corners
+MARGIN_CELLS = 12  # cells, empty margin round the drawn scan
+STEPS = 12  # most steps that refine a corner
+CUT = 3.5  # deviations at which a drawn dot ends
+FAINT = 0.01  # grey; pixels below say nothing of a line
+
+
+@njit
+def joined_beams(ranges: Float, valid: Bools, points: Float, step: float, slope: float) -> Bools:
+    """(n,) True where beams i and i + 1 hit one surface.
+
+    The adaptive breakpoint of Borges and Aldon (2004): their distance is at most what a surface
+    seen at the grazing angle ``slope`` (rad) shows between two beams ``step`` (rad) apart.
+    """
+    n = len(ranges)
+    joined = np.zeros(n, dtype=np.bool_)
+    for i in range(n - 1):
+        if valid[i] and valid[i + 1]:
+            near = min(ranges[i], ranges[i + 1])
+            most = near * math.sin(step) / math.sin(max(slope - step, 0.01)) + 3.0 * NOISE_M
+            gap = math.hypot(points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1])
+            joined[i] = gap <= most
+    return joined
+
+
+@njit
+def draw(
+    image: Float, widths: Float, points: Float, sigmas: Float, drawn: Bools, joined: Bools
+) -> None:
+    """Dots with peak 1 and those standard deviations (cells), joined where ``joined``.
+
+    ``points`` (n, 2) column, row in cells; between joined ones there is a dot every half cell. Each
+    pixel keeps the largest value and, in ``widths``, the standard deviation of that dot.
+    """
+    for i in range(len(points)):
+        if not drawn[i]:
+            continue
+        _dot(image, widths, points[i, 0], points[i, 1], sigmas[i])
+        if joined[i] and drawn[i + 1]:
+            dx, dy = points[i + 1, 0] - points[i, 0], points[i + 1, 1] - points[i, 1]
+            parts = int(math.hypot(dx, dy) / 0.5) + 1
+            for k in range(1, parts):
+                share = k / parts
+                sigma = sigmas[i] + share * (sigmas[i + 1] - sigmas[i])
+                x, y = points[i, 0] + share * dx, points[i, 1] + share * dy
+                _dot(image, widths, x, y, sigma)
+
+
+@inner
+def _dot(image: Float, widths: Float, x: float, y: float, sigma: float) -> None:
+    height, width = image.shape
+    reach = CUT * sigma
+    for row in range(max(0, math.ceil(y - reach)), min(height, math.floor(y + reach) + 1)):
+        for column in range(max(0, math.ceil(x - reach)), min(width, math.floor(x + reach) + 1)):
+            squared = ((column - x) ** 2 + (row - y) ** 2) / (sigma * sigma)
+            value = math.exp(-0.5 * squared)
+            if value > image[row, column]:
+                image[row, column] = value
+                widths[row, column] = sigma
+
+
+@njit
+def refine(image: Float, widths: Float, column: int, row: int) -> tuple[float, float, Float, bool]:
+    """The point where the drawn lines around a pixel meet or end, and its covariance (cells^2).
+
+    Every pixel of the image knows the point of the drawing nearest to it, p + w^2 grad(log I), as
+    I = exp(-d^2 / 2 w^2), and the direction n of the line there. Least squares over n . (p' - q),
+    weighted by the squared gradient and by a Gaussian half as wide as the window that follows q,
+    gives q with covariance s^2 (sum n n')^-1, s^2 being the mean residual (after Foerstner and
+    Guelch 1987, whose gradients at the pixels themselves pull ends and corners outwards by a line's
+    width). False where the gradients do not determine a point or it runs away from its start.
+    """
+    height, width = image.shape
+    x, y = float(column), float(row)
+    covariance = np.zeros((2, 2))
+    for _ in range(STEPS):
+        i0, j0 = round(x), round(y)
+        if not (WINDOW < i0 < width - WINDOW - 1 and WINDOW < j0 < height - WINDOW - 1):
+            return x, y, covariance, False
+        a = b = c = u = v = residual = total = 0.0
+        for j in range(j0 - WINDOW, j0 + WINDOW + 1):
+            for i in range(i0 - WINDOW, i0 + WINDOW + 1):
+                right, left = image[j, i + 1], image[j, i - 1]
+                up, down = image[j + 1, i], image[j - 1, i]
+                if min(min(right, left), min(up, down)) < FAINT:
+                    continue
+                squared = 0.5 * widths[j, i] ** 2
+                dx = i - x + squared * math.log(right / left)
+                dy = j - y + squared * math.log(up / down)
+                gx, gy = 0.5 * (right - left), 0.5 * (up - down)
+                weight = math.exp(-2.0 * ((i - x) ** 2 + (j - y) ** 2) / (WINDOW * WINDOW))
+                along = gx * dx + gy * dy
+                a += weight * gx * gx
+                b += weight * gx * gy
+                c += weight * gy * gy
+                u += weight * gx * along
+                v += weight * gy * along
+                residual += weight * along * along
+                total += weight * (gx * gx + gy * gy)
+        determinant = a * c - b * b
+        if determinant <= 1e-3 * (a + c) * (a + c):
+            return x, y, covariance, False
+        step_x, step_y = (c * u - b * v) / determinant, (a * v - b * u) / determinant
+        x, y = x + step_x, y + step_y
+        if max(abs(x - column), abs(y - row)) > WINDOW:
+            return x, y, covariance, False
+        # residual / total: squared distance in cells between the lines and q
+        half = 0.5 * (a + c)
+        covariance = np.array([[c, -b], [-b, a]]) * (residual / total * half / determinant)
+        if abs(step_x) + abs(step_y) < 0.01:
+            break
+    return x, y, covariance, True
+
 
 FAR_M = 1e6  # stands for no return
 
 
-CORNERS = CornerConfig()
-
-
-def corners(
-    scan: Scan, *, twist: Float | None = None, config: CornerConfig | None = None
-) -> Features:
+def corners(scan: Scan, *, twist: Float | None = None) -> Features:
     """Corners of ``scan`` in the robot frame at its stamp, de-skewed with the body ``twist``."""
-    config = config or CORNERS
     points = _points(scan, twist)
-    ranges = answered(scan, config.failed)
+    ranges = answered(scan)
     step = scan.spec.angle_increment
-    grazing = math.radians(config.grazing_deg)
-    joined = corner_image.joined_beams(ranges, scan.valid, points, step, grazing, config.noise_m)
+    joined = joined_beams(ranges, scan.valid, points, step, math.radians(GRAZING_DEG))
     valid, false_ends = _judge_ends(ranges, scan.valid, joined)
-    false_ends |= valid & _flat(points, scan, joined, math.radians(config.flat_deg))
-    near = ranges <= config.range_m
+    false_ends |= valid & _flat(points, scan, joined, math.radians(FLAT_DEG))
+    near = ranges <= RANGE_M
     false_ends |= valid & near & _beside(joined, ~near)  # only the limit of drawing
     valid, false_ends = valid & near, false_ends & near
     if not valid.any():
         return _features(scan, [], [])
-    image, widths, origin = _draw(points, ranges, valid, joined, step, config)
+    image, widths, origin = _draw(points, ranges, valid, joined, step)
     found, covariances = [], []
-    for column, row in _peaks(image, config):
-        x, y, cells, ok = corner_image.refine(image, widths, column, row, config.window)
-        point = origin + config.cell_m * np.array([x, y])
+    for column, row in _peaks(image):
+        x, y, cells, ok = refine(image, widths, column, row)
+        point = origin + CELL_M * np.array([x, y])
         beam = _nearest(point, points, valid)
-        if not ok or _misleads(point, beam, points, false_ends, config):
+        if not ok or _misleads(point, beam, points, false_ends):
             continue
         found.append(point)
         gap = _gap(beam, points, joined, ranges[beam] * step)
-        covariances.append(_covariance(cells, gap, config))
+        covariances.append(_covariance(cells, gap))
     return _features(scan, found, covariances)
 
 
-def answered(scan: Scan, most_failed: int = CORNERS.failed) -> Float:
+def answered(scan: Scan) -> Float:
     """(n,) m: ranges; ``FAR_M`` where nothing is, -1 where a beam failed."""
     failed = np.isnan(scan.ranges)
     ranges = np.where(failed, -1.0, np.minimum(scan.ranges, FAR_M, dtype=np.float64))
     edges = np.flatnonzero(np.diff(np.concatenate([[False], failed, [False]])))
     for first, past in edges.reshape(-1, 2).tolist():
-        if past - first > most_failed:
+        if past - first > FAILED:
             ranges[first:past] = FAR_M
     return ranges
 
@@ -129,33 +249,31 @@ def _draw(
     valid: NDArray[np.bool_],
     joined: NDArray[np.bool_],
     step: float,
-    config: CornerConfig,
 ) -> tuple[Float, Float, Float]:
     """The image, the width of its lines (cells), and the point (2,) m of its pixel (0, 0)."""
-    cell = config.cell_m
-    origin = points[valid].min(axis=0) - config.margin_cells * cell
+    origin = points[valid].min(axis=0) - MARGIN_CELLS * CELL_M
     width, height = (
-        np.ceil((points[valid].max(axis=0) - origin) / cell).astype(int) + config.margin_cells
+        np.ceil((points[valid].max(axis=0) - origin) / CELL_M).astype(int) + MARGIN_CELLS
     ).tolist()
     image, widths = np.zeros((height, width)), np.ones((height, width))
     # Across the beam a point may lie anywhere within the beam's share of the circle.
-    spread = np.sqrt(config.noise_m**2 + (np.maximum(ranges, 0.0) * step) ** 2 / 12.0) / cell
+    spread = np.sqrt(NOISE_M**2 + (np.maximum(ranges, 0.0) * step) ** 2 / 12.0) / CELL_M
     spread[~valid] = 1.0
-    sigmas = np.maximum(spread, config.min_sigma_cells)
-    corner_image.draw(image, widths, (points - origin) / cell, sigmas, valid, joined)
+    sigmas = np.maximum(spread, MIN_SIGMA_CELLS)
+    draw(image, widths, (points - origin) / CELL_M, sigmas, valid, joined)
     return image, widths, origin
 
 
-def _peaks(image: Float, config: CornerConfig) -> list[tuple[int, int]]:
+def _peaks(image: Float) -> list[tuple[int, int]]:
     """(column, row) of the local maxima of the smaller eigenvalue, the strongest first.
 
     OpenCV's response changes its last bits with the CPU; what is made of it, which pixel is the
     largest, does not but for ties.
     """
-    response = cv2.cornerMinEigenVal(image.astype(np.float32), config.block, ksize=3)
-    side = 2 * config.peak_cells + 1
+    response = cv2.cornerMinEigenVal(image.astype(np.float32), BLOCK, ksize=3)
+    side = 2 * PEAK_CELLS + 1
     around = cv2.dilate(response, np.ones((side, side), np.uint8))
-    rows, columns = np.nonzero((response >= around) & (response > config.response * config.ideal))
+    rows, columns = np.nonzero((response >= around) & (response > RESPONSE * IDEAL))
     order = np.argsort(-response[rows, columns], kind="stable")
     return [(int(columns[k]), int(rows[k])) for k in order]
 
@@ -165,11 +283,9 @@ def _nearest(point: Float, points: Float, valid: NDArray[np.bool_]) -> int:
     return int(away.argmin())
 
 
-def _misleads(
-    point: Float, beam: int, points: Float, false_ends: NDArray[np.bool_], config: CornerConfig
-) -> bool:
+def _misleads(point: Float, beam: int, points: Float, false_ends: NDArray[np.bool_]) -> bool:
     """Nothing was measured there, or a false end was."""
-    reach = config.window * config.cell_m
+    reach = WINDOW * CELL_M
     if ((points[beam] - point) ** 2).sum() > reach * reach:
         return True
     away = ((points[false_ends] - point) ** 2).sum(axis=1)
@@ -187,10 +303,10 @@ def _gap(beam: int, points: Float, joined: NDArray[np.bool_], across_m: float) -
     return max(gaps, key=lambda gap: float((gap * gap).sum()))
 
 
-def _covariance(cells: Float, gap: Float, config: CornerConfig) -> Float:
+def _covariance(cells: Float, gap: Float) -> Float:
     """Of the fit in the raster, of where in the gap between two beams it is, of what is round."""
-    fit = cells * config.cell_m**2
-    own = (config.noise_m**2 + config.floor_m**2) * np.eye(2)
+    fit = cells * CELL_M**2
+    own = (NOISE_M**2 + FLOOR_M**2) * np.eye(2)
     out: Float = fit + own + np.outer(gap, gap) / 3.0
     return out
 

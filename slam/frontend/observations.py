@@ -9,7 +9,7 @@ from __future__ import annotations
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
-from typing import Any, NamedTuple, Protocol
+from typing import Any, Protocol
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,11 +17,13 @@ from numpy.typing import NDArray
 from slam._jit import inner, njit
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, LaserSpec, Scan
-from slam.frontend.config import FRONTEND, FrontendConfig, Joining
+from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
-from slam.frontend.surfaces import face, join, unveiled
-from slam.frontend.visibility import View, view_of_beams, view_of_features
+from slam.frontend.surfaces import NEAR_CELLS, face, join, unmixed
+from slam.frontend.visibility import SILENT_M, View, view_of_beams, view_of_features
 
+SPACING_M = 0.1  # m; beams closer than this share one weight; set by hand
+LEAST_WEIGHT = 0.3  # share of a full observation, of a near beam; set by hand
 # Guards on what comes in, no settings: an ordinary stream is far from either.
 MOST_SWEPT_M = 50.0  # m driven during one sweep; more is a broken twist (5 m/s for 10 s), by hand
 MOST_STD_M = 3.0  # m, deviation of a feature used; more would fill 10^5 cells of 3 cm, by hand
@@ -145,26 +147,17 @@ def _scanned(  # noqa: PLR0913 (kernel)
     return count, rising
 
 
-class Weighing(NamedTuple):
-    """What the weight of a hit needs: rad between beams, and two of ``FrontendConfig``."""
-
-    increment: float
-    spacing_m: float
-    least: float
-
-
 @inner
 def _cleared(
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],
-    mixed_m: float,
     joined: NDArray[np.bool_],
     tangents: NDArray[np.float64],
 ) -> int:
     """Move the hits that are no mixed pixel to the front; how many there are."""
     clear = np.empty(len(points), np.bool_)
-    count = unveiled(points, beams, origin, joined, mixed_m, clear)
+    count = unmixed(points, beams, origin, joined, clear)
     if count < len(points):
         m = 0
         for k in range(len(points)):
@@ -180,9 +173,8 @@ def _surveyed(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],
-    joining: Joining,
-    stretches: tuple[float, float],
-    weighing: Weighing,
+    near: float,
+    increment: float,
     variance: float,
     joined: NDArray[np.bool_],
     tangents: NDArray[np.float64],
@@ -192,16 +184,16 @@ def _surveyed(  # noqa: PLR0913 (kernel)
 ) -> int:
     """Surfaces through the hits; those that remain are moved to the front, and their number.
 
-    ``stretches``: ``SurfaceConfig.mixed_m`` and ``face_m``; ``variance`` m^2 of every observation.
+    near  m, see ``join``; increment  rad between beams; variance  m^2 of every observation
     """
-    join(points, beams, origin, joining, joined, tangents)
-    count = _cleared(points, beams, origin, stretches[0], joined, tangents)
-    face(points[:count], origin, joined, stretches[1], facings)
+    join(points, beams, origin, near, joined, tangents)
+    count = _cleared(points, beams, origin, joined, tangents)
+    face(points[:count], origin, joined, facings)
     for k in range(count):
         covariances[k, 0], covariances[k, 1], covariances[k, 2] = variance, 0.0, variance
         x, y = points[k, 0], points[k, 1]
-        share = math.sqrt(x * x + y * y) * weighing.increment / weighing.spacing_m
-        weights[k] = min(max(share, weighing.least), 1.0)
+        share = math.sqrt(x * x + y * y) * increment / SPACING_M
+        weights[k] = min(max(share, LEAST_WEIGHT), 1.0)
     return count
 
 
@@ -217,14 +209,14 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
     beams = np.empty(n, np.int64)
     use = min(grain.range_m, spec.range_max)
-    config, surfaces = grain.frontend, grain.frontend.surfaces
+    config = grain.frontend
     count, rising = _scanned(
         scan.ranges,
         spec.angles,
         spec.beam_time_offsets,
         spec.T_robot_laser,
         twist,
-        (spec.range_min, spec.range_max, use, min(use, config.view.silent_m)),
+        (spec.range_min, spec.range_max, use, min(use, SILENT_M)),
         points,
         beams,
         bearings,
@@ -241,13 +233,11 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     )
     covariances, weights = np.empty((count, 3)), np.empty(count)
     left = _surveyed(
-        points, beams, spec.T_robot_laser, surfaces.joining(grain.cell_m),
-        (surfaces.mixed_m, surfaces.face_m),
-        Weighing(spec.angle_increment, config.spacing_m, config.least_weight),
+        points, beams, spec.T_robot_laser, NEAR_CELLS * grain.cell_m, spec.angle_increment,
         max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2,
         onward, tangents, facings, covariances, weights,
     )  # fmt: skip
-    view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m, config.view)
+    view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m)
     return Observations(
         points_robot=points[:left],
         covariances=covariances[:left],
@@ -302,7 +292,7 @@ def from_features(features: Features, grain: Grain) -> Observations:
         tangents=np.zeros((len(covariances), 2)),
         joined=np.zeros(len(covariances), np.bool_),
         facings=np.zeros(len(covariances), np.uint8),
-        view=view_of_features(points[near], grain.cell_m, grain.frontend.view),
+        view=view_of_features(points[near], grain.cell_m),
         T_robot_laser=np.zeros(3),
         sensor_sigma_m=grain.frontend.sensor_sigma_m,
     )

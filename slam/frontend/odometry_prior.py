@@ -1,5 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the robot should be by its odometry, and how sure of that one may be."""
+"""Where the robot should be by its odometry, how sure of that one may be, and its heading bias.
+
+Wheels of unequal size turn a robot that drives straight, a wrong track miscounts its turns
+(UMBmark, Borenstein and Feng 1996), both for a whole run. That bias is learnt while the map shows
+the heading; left in, it leads a robot astray as soon as the map shows little.
+"""
 
 from __future__ import annotations
 
@@ -11,8 +16,94 @@ import numpy as np
 from slam import se2
 from slam.frames import MOST_TWIST, Float, Odometry
 from slam.frontend import odometry_steps
-from slam.frontend.config import FRONTEND, PriorConfig
-from slam.frontend.odometry_bias import HeadingBias
+from slam.frontend.config import FRONTEND, BiasConfig
+
+# The heading bias; set by hand.
+LASTS_S = 1000.0  # s in which a robot's bias may change by 1 sigma
+INDEPENDENT = 0.3  # share of a match's information, from frame to frame
+DATA_SHARE = 0.5  # least share of the data in a match's heading
+MATCHED = 0.3  # least matched share of observations
+OUTLIER = 9.0  # squared innovation, in variances, above which a match is left out: 3 sigma
+PLACE_INFORMATION = 1e-3  # 1/m^2, of the position where it is unknown: 30 m
+# The prior; set by hand.
+FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # least deviation after FLOOR_S; grows with the root of time
+FLOOR_S, FLOOR_MOST_S = 0.2, 1.0  # s; the floors grow no further than over the latter
+LEAST_SCALE = 2.25  # least factor on a stated variance: else the map drifts unnoticed
+LEAST_M, LEAST_RAD = 0.004, 0.003  # least deviation for the matcher, after FLOOR_S
+# deviations where none is stated: m/m, m/rad, rad/sqrt(m), rad/rad
+ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
+LEAST_VARIANCE = 1e-12  # m^2 and rad^2, added so that none is zero: (1 um)^2, (1 urad)^2
+TWIST_S = 0.5  # s, longest odometry step that gives a twist
+
+
+class HeadingBias:
+    """A Kalman filter of three: the heading's error against the map, and the two biases.
+
+    Each match gives it what the data alone say of the heading. It learns nothing where they say
+    nothing, so it needs no gate against featureless places.
+
+    per_m, per_rad  what the odometry adds, rad for each m driven and each rad turned
+    """
+
+    def __init__(self, config: BiasConfig = FRONTEND.bias) -> None:
+        self._config = config
+        self.per_m, self.per_rad = 0.0, 0.0
+        self._P = [[0.0] * 3, [0.0, config.per_m**2, 0.0], [0.0, 0.0, config.per_rad**2]]
+
+    def corrected(self, increment: Float) -> Float:
+        """The increment (3,) without the biases."""
+        x, y, turn = increment.tolist()
+        return np.array([x, y, turn * (1.0 - self.per_rad) - x * self.per_m])
+
+    def learn(
+        self,
+        increment: Float,
+        elapsed: float,
+        variances: tuple[float, float],
+        matched: tuple[float, float, Float],
+    ) -> None:
+        """Take in one match.
+
+        increment  (3,) corrected motion of ``elapsed`` s that led to the prediction
+        variances  rad^2 of its heading: by odometry, and as the matcher was given it
+        matched    share of the observations matched, the heading found minus the predicted one
+                   (rad), and the data's information (3, 3) by (x, y, theta) at their full weight
+        """
+        said, given = variances
+        self._move(increment, said, elapsed)
+        share, off, information = matched
+        found = _of_heading(information)
+        kept = found * given / (1.0 + found * given)  # of what the data say, beside the prior
+        if share >= MATCHED and kept >= DATA_SHARE:
+            self._see(se2.wrap(off) / kept, 1.0 / (INDEPENDENT * found))
+
+    def _move(self, increment: Float, variance: float, elapsed: float) -> None:
+        P, G = self._P, (1.0, float(increment[0]), float(increment[2]))
+        row = [G[0] * P[0][k] + G[1] * P[1][k] + G[2] * P[2][k] for k in range(3)]
+        P[0] = [row[0] * G[0] + row[1] * G[1] + row[2] * G[2] + variance, row[1], row[2]]
+        P[1][0], P[2][0] = row[1], row[2]
+        config = self._config
+        P[1][1] += config.per_m**2 * elapsed / LASTS_S
+        P[2][2] += config.per_rad**2 * elapsed / LASTS_S
+
+    def _see(self, innovation: float, variance: float) -> None:
+        P = self._P
+        S = P[0][0] + variance
+        if innovation * innovation > OUTLIER * S:
+            return
+        K = [P[j][0] / S for j in range(3)]
+        self.per_m -= K[1] * innovation
+        self.per_rad -= K[2] * innovation
+        self._P = [[P[j][k] - K[j] * P[0][k] for k in range(3)] for j in range(3)]
+
+
+def _of_heading(information: Float) -> float:
+    """Information on the heading that is left with the place unknown, 1/rad^2."""
+    (a, b, e), (_, d, f), (_, _, h) = information.tolist()
+    a, d = a + PLACE_INFORMATION, d + PLACE_INFORMATION
+    left: float = h - (d * e * e - 2.0 * b * e * f + a * f * f) / max(a * d - b * b, 1e-9)
+    return max(left, 0.0)
+
 
 IDENTITY = np.eye(3)
 # Guard against rounding: least variance of a matrix left singular, m^2 and rad^2: (1 um, 1 urad)^2
@@ -90,12 +181,12 @@ class Prediction:
         return self.covariance + self.loosened + self.carried
 
 
-def assumed_covariance(increment: Float, config: PriorConfig = FRONTEND.prior) -> Float:
+def assumed_covariance(increment: Float) -> Float:
     """Covariance (3, 3) of an increment whose log says nothing, in the previous robot frame."""
     distance = math.hypot(float(increment[0]), float(increment[1]))
     turn = abs(float(increment[2]))
-    sd_xy = config.assumed_share * distance + config.assumed_turn_m * turn
-    sd_theta = config.assumed_rad_per_sqrt_m * math.sqrt(distance) + config.assumed_turn * turn
+    sd_xy = ASSUMED_SHARE * distance + ASSUMED_TURN_M * turn
+    sd_theta = ASSUMED_RAD_PER_SQRT_M * math.sqrt(distance) + ASSUMED_TURN * turn
     return np.diag([sd_xy**2, sd_xy**2, sd_theta**2])
 
 
@@ -118,7 +209,6 @@ def predict(
     now: Odometry,
     scales: tuple[float, float] = (1.0, 1.0),
     bias: HeadingBias | None = None,
-    config: PriorConfig = FRONTEND.prior,
 ) -> Prediction:
     """Chain the odometry increment on the last pose; covariance from the frame's own.
 
@@ -131,21 +221,21 @@ def predict(
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given = now.increment_covariance
     if given is None:
-        unscaled = assumed_covariance(increment, config)
+        unscaled = assumed_covariance(increment)
     else:
         unscaled = odometry_steps.invertible(given)
-    unscaled = unscaled + config.least_variance * IDENTITY
-    share = min(max(elapsed, 1e-3), config.floor_most_s) / config.floor_s
-    floor = share * config.floor_m**2, share * config.floor_rad**2
+    unscaled = unscaled + LEAST_VARIANCE * IDENTITY
+    share = min(max(elapsed, 1e-3), FLOOR_MOST_S) / FLOOR_S
+    floor = share * FLOOR_M**2, share * FLOOR_RAD**2
     widths = math.sqrt(scales[0]), math.sqrt(scales[1])
     in_robot = _widened(unscaled, widths, floor)
     loosened = np.zeros((3, 3))
     if given is not None:
         more = (
-            math.sqrt(max(config.least_scale - scales[0], 0.0)),
-            math.sqrt(max(config.least_scale - scales[1], 0.0)),
+            math.sqrt(max(LEAST_SCALE - scales[0], 0.0)),
+            math.sqrt(max(LEAST_SCALE - scales[1], 0.0)),
         )
-        least = share * config.least_m**2, share * config.least_rad**2
+        least = share * LEAST_M**2, share * LEAST_RAD**2
         rest = least[0] - floor[0], least[1] - floor[1]
         loosened = _widened(unscaled, more, rest)
     return Prediction(
@@ -155,15 +245,15 @@ def predict(
         unscaled=unscaled,
         loosened=turned(loosened, float(T_map_before[2])),
         floor=floor,
-        twist=_twist(now, increment, elapsed, config),
+        twist=_twist(now, increment, elapsed),
         elapsed=elapsed,
     )
 
 
-def _twist(now: Odometry, increment: Float, elapsed: float, config: PriorConfig) -> Float:
+def _twist(now: Odometry, increment: Float, elapsed: float) -> Float:
     """(3,) body velocity over the sweep: measured, else that of the increment, else none."""
     if now.twist is not None:
         return np.asarray(now.twist)
-    if 0.0 < elapsed < config.twist_s and float(np.abs(increment).max()) <= MOST_TWIST * elapsed:
+    if 0.0 < elapsed < TWIST_S and float(np.abs(increment).max()) <= MOST_TWIST * elapsed:
         return se2.log(increment) / elapsed
     return np.zeros(3)

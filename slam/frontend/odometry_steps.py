@@ -4,12 +4,14 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.frames import Float, Odometry
+from slam.frames import Float, Frame, Odometry
 
 MOST_STEP_M = 1000.0  # between two frames: farther, the stream is broken or of another run
 MOST_POSE = 1e9  # m and rad from the origin: there a double still resolves 0.1 micrometres
@@ -66,3 +68,40 @@ def increment(before: Odometry, now: Odometry) -> Float:
                 f"at {odometry.stamp_ns} ns"
             )
     return se2.between(before.T_odom_robot, now.T_odom_robot)
+
+
+class MotionSum:
+    """Sums the increments' covariances between the frames that a listener gets.
+
+    Where a step states none, the whole states none: a missing part would read as exact. The first
+    step of a stream moves nothing, so it may state none.
+    """
+
+    def __init__(self) -> None:
+        self._sum: Float | None = None
+        self._unstated, self._begun = False, False
+
+    def add(self, odometry: Odometry) -> None:
+        """One more step."""
+        part = odometry.increment_covariance
+        if part is None:
+            self._unstated |= self._begun
+        else:
+            self._sum = part if self._sum is None else self._sum + part
+        self._begun = True
+
+    def passed_on(self, frame: Frame) -> Frame:
+        """``frame`` with the covariance (3, 3) of all the motion since the last one passed on."""
+        whole = None if self._unstated else self._sum
+        self._sum, self._unstated = None, False
+        return replace(frame, odometry=replace(frame.odometry, increment_covariance=whole))
+
+
+def thinned(frames: Sequence[Frame], stride: int) -> list[Frame]:
+    """Every ``stride``-th frame without labels, with the covariance of all the motion between."""
+    out, motion = [], MotionSum()
+    for k, frame in enumerate(frames):
+        motion.add(frame.odometry)
+        if k % stride == 0:
+            out.append(replace(motion.passed_on(frame), labels=None))
+    return out

@@ -23,8 +23,30 @@ from slam import se2
 from slam.frames import NS_PER_S, Float, Frame, Scan
 from slam.frontend.deskew import end_points
 from slam.frontend.polar import polar
-from slam.frontend.range_error_config import RangeErrorConfig
 
+# Set by hand, but for what data sheets say.
+KNOT_M, RANGE_M = 0.75, 15.0  # m between the knots of the function of range; the last of them
+SIGMA_M = 0.02  # m, of that function before any scan; data sheets: typically 15 to 50 mm
+LENGTH_M = 2.0  # m, over which that function changes
+SIGMA_TAN2_M = 0.002  # m, of the error per squared tangent of the incidence, before any scan
+MOST_TAN2 = 9.0  # squared tangent beyond which that term grows no further: 72 degrees
+PINNED_M = 1e-5  # m, deviation of what is unobservable: none
+STEEPEST_DEG = 72.0  # incidence beyond which nothing is learnt
+WIDTH_M = 0.3  # m, length of surface to which a line is fitted
+FLAT_SIGMAS = 2.5  # most deviation from that line, of the ranges' own
+STEP_M, STEP_RAD = 0.25, 0.35  # m driven or rad turned between two scans learnt from
+FASTEST_RADPS = 0.6  # turning faster, a scan is not learnt from
+VIEWS, PAIRS = 24, 4  # scans kept to compare with; of them compared with a new one
+GATE_M = 0.12  # m, most distance between two sights of a surface
+OUTLIER_SIGMAS = 3.0  # a distance counts half from here on
+INDEPENDENT = 0.1  # share of the information of a comparison: its errors are shared
+POSITION_M, HEADING_RAD = 0.1, 0.05  # prior of the pose between two scans, 1 sigma
+EVIDENCE = 5.0  # nat, log of the odds for an error, from which on it is taken off
+LASTS_S = 1200.0  # s, memory: a scanner warms up
+REDRAW_BY_M = 0.002  # m, change of the error, r.m.s., for which the map is drawn again
+REDRAW_M = 45.0  # m driven, up to which that is done; longer runs have loops
+REDRAWN_KEYS = 2  # key frames drawn with each scan
+DRIFT_M, DRIFT_RAD = 0.03, 0.02  # prior of a key frame from the one before, 1 sigma
 DIGITS = 6  # of m that a correction has: those beyond follow the processor's linear algebra
 
 
@@ -64,10 +86,10 @@ def _lines(covariance: Float) -> tuple[Float, Float, Float]:
     return np.stack([-np.sin(along), np.cos(along)], axis=1), least, spread
 
 
-def sights(scan: Scan, twist: Float, config: RangeErrorConfig, sigma_m: float) -> Sights:
+def sights(scan: Scan, twist: Float, sigma_m: float) -> Sights:
     """Lines through neighbouring returns; ``twist`` (vx, vy, omega) is held over the sweep."""
     points, bearings, distances, ranges = _by_bearing(scan, twist)
-    half = np.ceil(0.5 * config.width_m / np.maximum(distances * scan.spec.angle_increment, 1e-6))
+    half = np.ceil(0.5 * WIDTH_M / np.maximum(distances * scan.spec.angle_increment, 1e-6))
     half = np.clip(half, 2, 40).astype(np.int64)
     count, mean, covariance = _moments(points, half)
     directions = points / np.maximum(distances, 1e-9)[:, None]
@@ -80,8 +102,8 @@ def sights(scan: Scan, twist: Float, config: RangeErrorConfig, sigma_m: float) -
     normals *= -np.sign(facing)[:, None]
     facing = -np.maximum(np.abs(facing), 1e-3)
     off = ((points - mean) * normals).sum(axis=1)
-    steepest = math.cos(math.radians(config.steepest_deg))
-    limit = config.flat_sigmas * sigma_m
+    steepest = math.cos(math.radians(STEEPEST_DEG))
+    limit = FLAT_SIGMAS * sigma_m
     flat = (count == 2 * half + 1) & (least < limit**2) & (np.abs(off) < 2.0 * limit)
     flat &= (-facing > steepest) & (spread > 16.0 * sigma_m**2)
     return Sights(
@@ -140,14 +162,13 @@ class RangeError:
     ``sigma_m`` of a range is that of the scanner's noise, for the weights.
     """
 
-    def __init__(self, config: RangeErrorConfig) -> None:
-        self.config = config
-        self.knots = math.ceil(config.range_m / config.knot_m) + 1
-        at = config.knot_m * np.arange(self.knots)
-        apart = math.sqrt(5.0) * np.abs(at[:, None] - at[None, :]) / config.length_m
+    def __init__(self) -> None:
+        self.knots = math.ceil(RANGE_M / KNOT_M) + 1
+        at = KNOT_M * np.arange(self.knots)
+        apart = math.sqrt(5.0) * np.abs(at[:, None] - at[None, :]) / LENGTH_M
         prior = np.zeros((self.knots + 1, self.knots + 1))
-        prior[:-1, :-1] = config.sigma_m**2 * (1.0 + apart + apart**2 / 3.0) * np.exp(-apart)
-        prior[-1, -1] = config.sigma_tan2_m**2
+        prior[:-1, :-1] = SIGMA_M**2 * (1.0 + apart + apart**2 / 3.0) * np.exp(-apart)
+        prior[-1, -1] = SIGMA_TAN2_M**2
         self._prior = prior
         self._precision = np.linalg.inv(prior)
         self._information = np.zeros_like(prior)
@@ -160,18 +181,18 @@ class RangeError:
 
     def design(self, ranges: Float, facing: Float) -> Float:
         """(n, knots + 1) of the basis functions."""
-        tan2 = np.minimum(1.0 / np.maximum(facing**2, 1e-6) - 1.0, self.config.most_tan2)
-        return np.column_stack([hats(ranges, self.knots, self.config.knot_m), tan2])
+        tan2 = np.minimum(1.0 / np.maximum(facing**2, 1e-6) - 1.0, MOST_TAN2)
+        return np.column_stack([hats(ranges, self.knots, KNOT_M), tan2])
 
     def at(self, ranges: Float, coefficients: Float | None = None) -> Float:
         """(n,) m by which ranges are off, but for the incidence; ``coefficients``: others."""
         by = self.coefficients if coefficients is None else coefficients
-        off: Float = np.round(hats(ranges, self.knots, self.config.knot_m) @ by[:-1], DIGITS)
+        off: Float = np.round(hats(ranges, self.knots, KNOT_M) @ by[:-1], DIGITS)
         return off
 
     def sigma_m(self, ranges: Float) -> Float:
         """(n,) m, standard deviation of ``at``: the prior's where nothing was learnt."""
-        shares = hats(ranges, self.knots, self.config.knot_m)
+        shares = hats(ranges, self.knots, KNOT_M)
         variances = ((shares @ self.covariance[:-1, :-1]) * shares).sum(axis=1)
         out: Float = np.round(np.sqrt(np.maximum(variances, 0.0)), DIGITS)
         return out
@@ -185,7 +206,6 @@ class RangeError:
 
     def compare(self, new: Sights, old: Sights, T_old_new: Float, sigma_m: float) -> int:
         """Learn from the surfaces seen in both; returns how many returns were compared."""
-        config = self.config
         mine = np.flatnonzero(new.flat)
         if not len(mine) or not old.flat.any():
             return 0
@@ -199,7 +219,7 @@ class RangeError:
         off = ((there - old.anchors[theirs]) * normals).sum(axis=1)
         alike = ((new.normals[mine] @ turn.T) * normals).sum(axis=1)
         close = np.abs(bearings - old.bearings[theirs]) < 0.02
-        kept = old.flat[theirs] & close & (np.abs(off) < config.gate_m) & (alike > 0.95)
+        kept = old.flat[theirs] & close & (np.abs(off) < GATE_M) & (alike > 0.95)
         if kept.sum() < 12:
             return 0
         mine, theirs, there, normals = mine[kept], theirs[kept], there[kept], normals[kept]
@@ -217,30 +237,28 @@ class RangeError:
         pose = np.column_stack([normals, lever])
         variance = sigma_m**2 * facing**2 * 1.3 + 1e-6
         self._take(pose, basis, off, variance)
-        self.reach += hats(own, self.knots, config.knot_m).sum(axis=0)
+        self.reach += hats(own, self.knots, KNOT_M).sum(axis=0)
         return len(mine)
 
     def _take(self, pose: Float, basis: Float, off: Float, variance: Float) -> None:
-        config = self.config
-        prior = np.diag([config.position_m**-2, config.position_m**-2, config.heading_rad**-2])
+        prior = np.diag([POSITION_M**-2, POSITION_M**-2, HEADING_RAD**-2])
         weights = 1.0 / variance
         left = off - basis @ self.coefficients
         for _ in range(3):
             weighted = pose * weights[:, None]
             step = np.linalg.solve(prior + pose.T @ weighted, weighted.T @ left)
-            wild = (left - pose @ step) ** 2 / (variance * config.outlier_sigmas**2)
+            wild = (left - pose @ step) ** 2 / (variance * OUTLIER_SIGMAS**2)
             weights = 1.0 / (variance * (1.0 + wild) ** 2)
         weighted = pose * weights[:, None]
         inner = np.linalg.inv(prior + pose.T @ weighted)
         cross = weighted.T @ basis
         heavy = basis * weights[:, None]
-        share = config.independent
-        self._information += share * (heavy.T @ basis - cross.T @ inner @ cross)
-        self._vector += share * (heavy.T @ off - cross.T @ (inner @ (weighted.T @ off)))
+        self._information += INDEPENDENT * (heavy.T @ basis - cross.T @ inner @ cross)
+        self._vector += INDEPENDENT * (heavy.T @ off - cross.T @ (inner @ (weighted.T @ off)))
 
     def fade(self, elapsed_s: float) -> None:
         """Forget slowly."""
-        kept = math.exp(-elapsed_s / self.config.lasts_s)
+        kept = math.exp(-elapsed_s / LASTS_S)
         self._information *= kept
         self._vector *= kept
         self.reach *= kept
@@ -258,22 +276,22 @@ class RangeError:
         self.covariance = np.asarray(np.linalg.inv(pinned + self._information), dtype=np.float64)
         self.coefficients = self.covariance @ self._vector
         self.odds = 0.5 * float(self._vector @ self.coefficients - (after - before))
-        self.found = self.odds > (0.0 if self.found else self.config.evidence)
+        self.found = self.odds > (0.0 if self.found else EVIDENCE)
 
     def _gauge(self) -> Float:
         """Precision of what is unobservable: an error proportional to the range."""
-        scale = self.config.knot_m * np.arange(self.knots)
+        scale = KNOT_M * np.arange(self.knots)
         shares = self.reach / self.reach.sum()
         pinned = np.append(shares * scale, 0.0)
-        return np.outer(pinned, pinned) / (self.config.pinned_m**2 * float(shares @ scale**2))
+        return np.outer(pinned, pinned) / (PINNED_M**2 * float(shares @ scale**2))
 
 
 class RangeCorrection:
     """Takes the learnt error off the ranges, and learns on from where the SLAM puts the robot."""
 
-    def __init__(self, config: RangeErrorConfig, sensor_sigma_m: float) -> None:
-        self.config, self._sigma_m = config, sensor_sigma_m
-        self.error = RangeError(config)
+    def __init__(self, sensor_sigma_m: float) -> None:
+        self._sigma_m = sensor_sigma_m
+        self.error = RangeError()
         self._views: list[tuple[Float, Sights]] = []
         self._before_ns: int | None = None
 
@@ -299,30 +317,30 @@ class RangeCorrection:
 
     def learn(self, frame: Frame, twist: Float, T_map_robot: Float, *, tracked: bool) -> None:
         """From ranges as reported, seen at ``T_map_robot``; most scans are too near to the last."""
-        config, scan = self.config, frame.scan
+        scan = frame.scan
         if not tracked:
             self.forget_views()
         if scan is None or not tracked:
             return
         T_map_laser = se2.compose(T_map_robot, scan.spec.T_robot_laser)
-        if abs(float(twist[2])) > config.fastest_radps or not self._is_new(T_map_laser):
+        if abs(float(twist[2])) > FASTEST_RADPS or not self._is_new(T_map_laser):
             return
         sigma_m = scan.spec.range_sigma_m or self._sigma_m
-        new = sights(scan, twist, config, sigma_m)
+        new = sights(scan, twist, sigma_m)
         count = len(self._views)
-        for back in [2**k - 1 for k in range(1, config.pairs + 1)]:
+        for back in [2**k - 1 for k in range(1, PAIRS + 1)]:
             if back <= count:
                 T_map_old, old = self._views[count - back]
                 self.error.compare(new, old, se2.between(T_map_old, T_map_laser), sigma_m)
         if self._before_ns is not None:
             self.error.fade((scan.stamp_ns - self._before_ns) / NS_PER_S)
         self._before_ns = scan.stamp_ns
-        self._views = [*self._views, (T_map_laser, new)][-config.views :]
+        self._views = [*self._views, (T_map_laser, new)][-VIEWS:]
         self.error.solve()
 
     def _is_new(self, T_map_laser: Float) -> bool:
         if not self._views:
             return True
         step = se2.between(self._views[-1][0], T_map_laser)
-        far = math.hypot(float(step[0]), float(step[1])) >= self.config.step_m
-        return far or abs(se2.wrap(float(step[2]))) >= self.config.step_rad
+        far = math.hypot(float(step[0]), float(step[1])) >= STEP_M
+        return far or abs(se2.wrap(float(step[2]))) >= STEP_RAD

@@ -16,11 +16,9 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Scan
-from slam.frontend.config import FRONTEND
+from slam.frontend.visibility import SILENT_M
 from slam.strips import MapStrips, Piece, Rectangle, Span, edges, runs
 
-# Returns from farther away prove nothing either: they may have come through a window.
-FREE_AT_MOST_M = FRONTEND.view.silent_m
 _CHUNK = 512  # cells along a tile: of small ones OpenCV takes as long for each scan and tile
 _SHIFT = 4  # bits of the parts of a cell in which OpenCV takes corners
 _PARTS = 1 << _SHIFT
@@ -38,11 +36,12 @@ class SeenSpace:
     def add(self, scan: Scan, T_map_robot: Float) -> None:
         """Mark what ``scan`` saw from ``T_map_robot`` (not de-skewed: a cell more or less).
 
-        As far as returns prove: black surfaces and windows are silent, too.
+        As far as returns prove: black surfaces and windows are silent, too, and what returns from
+        farther away may have come through a window.
         """
         ranges = scan.ranges.astype(np.float64)
         ranges[~scan.valid] = 0.0  # a beam that was lost, or went on through a window
-        ranges = np.minimum(ranges, FREE_AT_MOST_M)
+        ranges = np.minimum(ranges, SILENT_M)
         angles = scan.spec.angles
         rim = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
         outline = np.vstack([np.zeros((1, 2)), rim])

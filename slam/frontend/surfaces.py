@@ -9,14 +9,19 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner
-from slam.frontend.config import FRONTEND, Joining
 
-LINE_HITS = FRONTEND.surfaces.line_hits
-FACES, FACES_SEEN = (
-    128,
-    0x80,
-)  # directions distinguished; a facing is FACES_SEEN | direction, 0: unknown
-AWAY = int(FACES * FRONTEND.surfaces.opposite_deg / 360.0)
+NEAR_CELLS = 3.0  # cells; neighbouring hits this near are of one surface; set by hand
+LONGEST_M = 1.0  # m, longest stretch between two joined hits; set by hand
+LINE_HITS = 4  # hits on one line: a surface between distant hits; set by hand
+LIKE_STEPS = 4.0  # ratio of neighbouring steps along a surface, at most; set by hand
+SLACK_M = 0.04  # m; a hit may lie this far off its line, along the beam; set by hand
+SLACK = 0.15  # the same as a share of the step: the larger of both holds; set by hand
+FACE_M = 0.1  # m; a facing is averaged over it, each way, as hits are closer than their noise
+OPPOSITE_DEG = 135.0  # surfaces turned by more face away from each other; set by hand
+MIXED_M = 1.5  # m; surfaces farther apart are ranged apart; set by hand
+# directions distinguished; a facing is FACES_SEEN | direction, 0: unknown
+FACES, FACES_SEEN = 128, 0x80
+AWAY = int(FACES * OPPOSITE_DEG / 360.0)
 
 
 @inner
@@ -26,7 +31,6 @@ def _one_line(
     first: int,
     x: float,
     y: float,
-    joining: Joining,
 ) -> bool:
     """True where hits ``first`` .. ``first + 3`` lie as on one straight surface seen from (x, y).
 
@@ -38,16 +42,16 @@ def _one_line(
         return False
     ax, ay = points[first, 0] - x, points[first, 1] - y
     ex, ey = points[last, 0] - points[first, 0], points[last, 1] - points[first, 1]
-    before, like = 0.0, joining.like_steps
+    before = 0.0
     for k in range(first, last):
         dx, dy = points[k + 1, 0] - points[k, 0], points[k + 1, 1] - points[k, 1]
         step = math.sqrt(dx * dx + dy * dy)
-        if dx * ex + dy * ey <= 0.0 or step > joining.longest_m:
+        if dx * ex + dy * ey <= 0.0 or step > LONGEST_M:
             return False
-        if k > first and not before < like * step < like * like * before:
+        if k > first and not before < LIKE_STEPS * step < LIKE_STEPS * LIKE_STEPS * before:
             return False
         before = step
-    slack = max(joining.slack_m, joining.slack * math.sqrt(ex * ex + ey * ey) / (LINE_HITS - 1))
+    slack = max(SLACK_M, SLACK * math.sqrt(ex * ex + ey * ey) / (LINE_HITS - 1))
     for k in range(first + 1, last):
         bx, by = points[k, 0] - x, points[k, 1] - y
         cross = bx * ey - by * ex
@@ -64,17 +68,17 @@ def join(
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],
-    joining: Joining,
+    near: float,
     out: NDArray[np.bool_],
     tangents: NDArray[np.float64],
 ) -> None:
     """Mark the points whose surface goes on to the next one; fill the tangents.
 
     Hits of neighbouring beams (of index ``beams``, from a laser at ``origin``) are joined when they
-    are within ``joining.near_m``, or when the stretch between them is part of a run of four hits on
+    are within ``near`` m, or when the stretch between them is part of a run of four hits on
     one line. Less evidence will not do: two table legs and the wall behind them often are in line.
     """
-    n, near = len(points), joining.near_m
+    n = len(points)
     out[:] = False
     for k in range(n - 1):
         if beams[k + 1] != beams[k] + 1:
@@ -84,7 +88,7 @@ def join(
             out[k] = True
     for k in range(n - LINE_HITS + 1):
         if not (out[k] and out[k + 1] and out[k + 2]) and _one_line(
-            points, beams, k, origin[0], origin[1], joining
+            points, beams, k, origin[0], origin[1]
         ):
             out[k], out[k + 1], out[k + 2] = True, True, True
     for k in range(n):
@@ -101,20 +105,15 @@ def face(
     points: NDArray[np.float64],
     origin: NDArray[np.float64],
     joined: NDArray[np.bool_],
-    stretch: float,
     out: NDArray[np.uint8],
 ) -> None:
-    """The way the surface under each hit faces, in robot axes; 0 for a hit joined to none.
-
-    Averaged over ``stretch`` m to either side: neighbouring hits near by are closer than their
-    noise.
-    """
+    """The way the surface under each hit faces, in robot axes; 0 for a hit joined to none."""
     n = len(points)
     for k in range(n):
         first, last = k, k
-        while first > 0 and joined[first - 1] and _apart(points, first, k) < stretch:
+        while first > 0 and joined[first - 1] and _apart(points, first, k) < FACE_M:
             first -= 1
-        while last < n - 1 and joined[last] and _apart(points, last, k) < stretch:
+        while last < n - 1 and joined[last] and _apart(points, last, k) < FACE_M:
             last += 1
         out[k] = 0
         if first == last:
@@ -153,19 +152,17 @@ def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
 
 
 @inner
-def unveiled(
+def unmixed(
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],
     joined: NDArray[np.bool_],
-    distinct: float,
     out: NDArray[np.bool_],
 ) -> int:
     """Mark the hits that are no mixed pixel, and count them.
 
     A spot that lies half on an edge and half on what is behind is ranged somewhere between: between
-    its neighbours' ranges, and joined to neither of them. ``distinct``: surfaces farther apart than
-    so many m are ranged one by one.
+    its neighbours' ranges, and joined to neither of them.
     """
     n, count = len(points), 0
     for k in range(n):
@@ -175,7 +172,7 @@ def unveiled(
             before, here = _range(points, k - 1, origin), _range(points, k, origin)
             after = _range(points, k + 1, origin)
             between = before < here < after or before > here > after
-            out[k] = abs(after - before) > distinct or not between
+            out[k] = abs(after - before) > MIXED_M or not between
         if out[k]:
             count += 1
     return count

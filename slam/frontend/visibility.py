@@ -14,8 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frontend.config import FRONTEND, ViewConfig
 from slam.frontend.polar import BEARING_OFF, bearing
+
+MARGIN_CELLS = 1.5  # cells; a cell seen empty is before a beam's end by this; set by hand
+GATE_CELLS = 0.6  # cells; a cell seen empty is this near to a beam, sideways; set by hand
+SILENT_M = 30.0  # m, free space that a beam without return shows; LMS-221: its range at 10 %
+FEATURE_BIN_DEG = 1.0  # step of the view between point features; set by hand
+FEATURE_GAP_DEG = 60.0  # widest gap between features that is seen empty; set by hand
 
 
 class View(NamedTuple):
@@ -73,27 +78,24 @@ def view_of_beams(
     free_ranges: NDArray[np.float64],
     increment: float,
     cell: float,
-    config: ViewConfig = FRONTEND.view,
 ) -> View:
     """Sort beams (bearing rad, free range m; 0: not measured) into bins of about ``increment``."""
     bins = max(8, math.floor(math.tau / increment + 1e-6))
     step = math.tau / bins
     limit, offset = np.empty(bins), np.empty(bins)
     farthest = _fill(bearings, free_ranges, step, limit, offset)
-    margin, gate = config.margin_cells * cell, config.gate_cells * cell
+    margin, gate = MARGIN_CELLS * cell, GATE_CELLS * cell
     return View(step, limit, offset, farthest, margin, gate)
 
 
-def view_of_features(
-    points: NDArray[np.float64], cell: float, config: ViewConfig = FRONTEND.view
-) -> View:
+def view_of_features(points: NDArray[np.float64], cell: float) -> View:
     """What a frame of point features (n, 2) m sees: the sectors between neighbours, as far as the
     farther of the two, and nothing behind a feature.
     """
     order = sorted((math.atan2(y, x), math.hypot(x, y)) for x, y in points.tolist())
     bearings: list[float] = []
     ranges: list[float] = []
-    step, widest = math.radians(config.feature_bin_deg), math.radians(config.feature_gap_deg)
+    step, widest = math.radians(FEATURE_BIN_DEG), math.radians(FEATURE_GAP_DEG)
     for (b0, r0), (b1, r1) in zip(order, order[1:] + order[:1], strict=True):
         gap = (b1 - b0) % math.tau
         bearings.append(b0)
@@ -102,7 +104,7 @@ def view_of_features(
             between = np.arange(step, gap, step)
             bearings += (b0 + between).tolist()
             ranges += [max(r0, r1)] * len(between)
-    view = view_of_beams(np.array(bearings), np.array(ranges), step, cell, config)
+    view = view_of_beams(np.array(bearings), np.array(ranges), step, cell)
     return view._replace(gate=math.inf)
 
 

@@ -10,16 +10,46 @@ in no fixed order: two runs agree to about 1e-14 m a scan, not to the bit.
 
 from __future__ import annotations
 
+import ctypes
+import os
+import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from typing import Any
 
 import numpy as np
 
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, needed
-from slam.guests.layers import flattened, lifted, stacked, voxel_m
-from slam.guests.quiet import quiet
+from slam.guests.guest import Guest, flattened, lifted, needed, stacked, voxel_m
 from slam.system import register
+
+
+@contextmanager
+def quiet() -> Iterator[None]:
+    """Nothing reaches this process's standard output meanwhile, whoever writes to it.
+
+    What was written before it does, and later output does again, whatever is raised.
+    """
+    libc = ctypes.CDLL(None)
+    sys.stdout.flush()
+    libc.fflush(None)  # what C has kept so far is not to be dropped
+    kept = os.dup(1)
+    try:
+        nothing = os.open(os.devnull, os.O_WRONLY)
+        os.dup2(nothing, 1)
+        os.close(nothing)
+        try:
+            yield
+        finally:
+            try:
+                sys.stdout.flush()
+                libc.fflush(None)
+            finally:
+                os.dup2(kept, 1)
+    finally:
+        os.close(kept)
+
 
 KEPT_SHARE = 0.5  # of a voxel: edge of the cells of which map and match take one point each; at
 # 1.0 the layers fall together now and then, and the match diverges in small rooms

@@ -15,8 +15,7 @@ import numpy as np
 from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, needed
-from slam.guests.layers import flattened, lifted, moved_on, nearest, stacked
+from slam.guests.guest import Guest, flattened, lifted, moved_on, nearest, needed, stacked
 from slam.system import register
 
 CELL_M = 0.05  # m; one point in each such cell

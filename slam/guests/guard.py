@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The process that ends what a mobilia has started when that asks for it, or dies.
 
-``guarding`` runs this file as a script of its own, with nothing but the standard library (10 MB,
+``wire`` runs this file as a script of its own, with nothing but the standard library (10 MB,
 some 10 ms): ``python -I -S guard.py DESCRIPTOR PARENT``. Over that socket it is told what to do.
 The end of the socket, or the death of ``PARENT``, is its order to kill.
 

@@ -16,8 +16,7 @@ import numpy as np
 from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, needed
-from slam.guests.layers import NOTHING_M, check_beams, moved_on, nearest, ranges_of
+from slam.guests.guest import NOTHING_M, Guest, check_beams, moved_on, nearest, needed, ranges_of
 from slam.system import register
 
 RANGE_M = 20.0

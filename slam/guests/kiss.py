@@ -14,8 +14,7 @@ import numpy as np
 
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, needed
-from slam.guests.layers import flattened, lifted, voxel_m
+from slam.guests.guest import Guest, flattened, lifted, needed, voxel_m
 from slam.system import register
 
 MAP_M = 100.0  # structure farther from the robot is dropped from its map

@@ -1,10 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""MRPT's SLAM programs, which read a file and end: what ``icp-slam`` and ``rbpf-slam`` share."""
+"""MRPT's SLAM programs, which read a file and end: what ``icp-slam`` and ``rbpf-slam`` share.
+
+The file is a rawlog: pairs of an action (odometry) and a sensory frame (one planar scan) in MRPT's
+serialisation, little endian: of each object the length of its class name with the top bit set, the
+name, a version of the layout, the members, and the byte 0x88. The layouts are those that MRPT 2.5
+writes, but for ``CSensoryFrame`` (2), which it reads too. It is not compressed: zlib, with which
+MRPT opens it, reads such files as they are.
+"""
 
 from __future__ import annotations
 
 import math
 import shutil
+import struct
+from dataclasses import dataclass
 from pathlib import Path
 from tempfile import TemporaryDirectory
 from typing import ClassVar
@@ -16,11 +25,78 @@ from slam.errors import MissingDependencyError, SlamFailedError
 from slam.estimate import Estimate
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests import rawlog, wire
-from slam.guests.guest import Guest
-from slam.guests.layers import check_beams, ranges_of
+from slam.guests import wire
+from slam.guests.guest import Guest, check_beams, ranges_of
 from slam.guests.pipe import Limits
 from slam.trajectory import Trajectory
+
+EPOCH_100NS = 116_444_736_000_000_000  # MRPT's time is 100 ns since 1601: here 1970-01-01
+LABEL = b"LASER"
+_ODOMETRY, _GAUSSIAN = 0, 0  # CActionRobotMovement2D: emOdometry, mmGaussian
+
+
+@dataclass(frozen=True, kw_only=True)
+class MotionModel:
+    """MRPT's Gaussian error of an odometry step: its standard deviations grow with the motion."""
+
+    m_per_m: float
+    m_per_rad: float
+    rad_per_m: float
+    rad_per_rad: float
+    least_m: float
+    least_rad: float
+
+
+def _object(name: str, version: int, members: bytes) -> bytes:
+    return bytes((0x80 | len(name),)) + name.encode() + bytes((version,)) + members + b"\x88"
+
+
+def _pose3d(pose: Float) -> bytes:
+    """A planar pose in space: position and rotation matrix."""
+    x, y, theta = pose.tolist()
+    c, s = math.cos(theta), math.sin(theta)
+    numbers = (x, y, 0.0, c, -s, 0.0, s, c, 0.0, 0.0, 0.0, 1.0)
+    return _object("mrpt::poses::CPose3D", 3, struct.pack("<12d", *numbers))
+
+
+def action(stamp_ns: int, increment: Float, model: MotionModel) -> bytes:
+    """A step (3,) m, m, rad by odometry, in the robot frame before it."""
+    gaussian = (
+        model.m_per_m, model.m_per_rad, model.rad_per_m, model.rad_per_rad,
+        model.least_m, model.least_rad,
+    )  # fmt: skip
+    members = b"".join((
+        struct.pack("<I", _ODOMETRY),
+        _object("mrpt::poses::CPose2D", 1, struct.pack("<3d", *increment.tolist())),
+        struct.pack("<I6f", _GAUSSIAN, *gaussian),
+        struct.pack("<I6f", 0, *(0.0,) * 6),  # the other model, not used
+        struct.pack("<??", False, False),  # no velocities, no encoder ticks
+        struct.pack("<q", EPOCH_100NS + stamp_ns // 100),
+    ))  # fmt: skip
+    moved = _object("mrpt::obs::CActionRobotMovement2D", 7, members)
+    return _object("mrpt::obs::CActionCollection", 0, struct.pack("<I", 1) + moved)
+
+
+def sensed(stamp_ns: int, ranges: Float, spec: LaserSpec) -> bytes:
+    """A frame of one scan (n_beams,) m; a range that is not finite is no valid one."""
+    valid = np.isfinite(ranges)
+    aperture = (spec.n_beams - 1) * spec.angle_increment
+    middle = np.array([0.0, 0.0, spec.angle_min + aperture / 2.0])
+    members = b"".join((
+        struct.pack("<f?f", aperture, True, spec.range_max),  # counter-clockwise
+        _pose3d(se2.compose(spec.T_robot_laser, middle)),
+        struct.pack("<I", spec.n_beams),
+        np.where(valid, ranges, 0.0).astype("<f4").tobytes(),
+        valid.astype("u1").tobytes(),
+        struct.pack("<f", spec.range_sigma_m or 0.01),
+        struct.pack("<q", EPOCH_100NS + stamp_ns // 100),
+        struct.pack("<f", spec.angle_increment / 2.0),  # of the beam itself
+        struct.pack("<I", len(LABEL)) + LABEL,
+        struct.pack("<d?", 0.0, False),  # no pitch during the sweep, no intensities
+    ))  # fmt: skip
+    scan = _object("mrpt::obs::CObservation2DRangeScan", 7, members)
+    return _object("mrpt::obs::CSensoryFrame", 2, struct.pack("<I", 1) + scan)
+
 
 MOST_BEAMS = 100_000
 SCAN_LIMIT_S = 2.0  # s a scan that a program may take, in the mean; rbpf-slam takes 0.1
@@ -38,7 +114,7 @@ class MrptSlam(Guest):
 
     command: ClassVar[str]
     config: ClassVar[str]  # the text of its config file; ``{folder}`` is where its logs go
-    motion: ClassVar[rawlog.MotionModel]
+    motion: ClassVar[MotionModel]
     columns: ClassVar[tuple[int, int]]  # of its logs of the path and of times, in MRPT 2.5
     pose_columns: ClassVar[tuple[int, int, int]]  # x, y (m) and yaw (rad) in that of the path
     ms_column: ClassVar[int]  # in that of times
@@ -95,8 +171,8 @@ class MrptSlam(Guest):
         stamps = self._path.trajectory().stamps_ns.tolist()
         with (folder / "frames.rawlog").open("wb") as file:
             for stamp_ns, (increment, ranges) in zip(stamps, self._frames, strict=True):
-                file.write(rawlog.action(stamp_ns, increment, self.motion))
-                file.write(rawlog.sensed(stamp_ns, ranges, self._spec))
+                file.write(action(stamp_ns, increment, self.motion))
+                file.write(sensed(stamp_ns, ranges, self._spec))
         (folder / "config.ini").write_text(self.config.format(folder=f"{folder}/log"))
         words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
         processor_s = wire.run(words, Limits.first_s + len(stamps) * SCAN_LIMIT_S)

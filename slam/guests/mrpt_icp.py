@@ -8,8 +8,7 @@ arena and station, still and at motion 0.5): every scan is matched, by every poi
 
 from __future__ import annotations
 
-from slam.guests.mrpt import MrptSlam
-from slam.guests.rawlog import MotionModel
+from slam.guests.mrpt import MotionModel, MrptSlam
 from slam.system import register
 
 CONFIG = """\

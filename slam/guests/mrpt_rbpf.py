@@ -12,8 +12,7 @@ and flew off by tens of metres among movers: it does not weigh odometry.
 
 from __future__ import annotations
 
-from slam.guests.mrpt import MrptSlam
-from slam.guests.rawlog import MotionModel
+from slam.guests.mrpt import MotionModel, MrptSlam
 from slam.system import register
 
 CONFIG = """\

@@ -17,8 +17,7 @@ import numpy as np
 from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, needed
-from slam.guests.layers import KEEP_M, NOTHING_M, check_beams, moved_on, ranges_of
+from slam.guests.guest import KEEP_M, NOTHING_M, Guest, check_beams, moved_on, needed, ranges_of
 from slam.system import register
 from slam.trajectory import Trajectory
 

@@ -9,7 +9,7 @@ pairs, and among those for the least joint cost, and differ in how they judge on
   test of a pair at depth k costs O(k^2);
 - ``ipjc`` (Li and Olson 2012): each accepted pair updates the state, and the posterior judges the
   next, linearised where the pairs before have moved it. Any test costs O(1), an acceptance O(c^2)
-  for c candidate landmarks. After each, all pairs that are left are tested anew: the posterior
+  for c candidate landmarks. After each, all pairs that are left are tested again: the posterior
   shows which points no landmark can explain any more, and hypotheses that leave out good pairs are
   cut at once.
 
@@ -25,11 +25,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.frames import Float
-from slam.landmarks import kernels, pairs
+from slam.landmarks import kernels
+from slam.landmarks.compatibility import CUT_SHORT, NODES, TESTS, Jcbb, Search, distances, visit
 from slam.landmarks.filter import EkfFilter
 from slam.landmarks.hypotheses import Association, Best, Effort, Gates, Ints
-from slam.landmarks.ipjc import CUT_SHORT, NODES, TESTS, Search, visit
-from slam.landmarks.jcbb import Jcbb
 
 Associate = Callable[[EkfFilter, Ints, Float, Float, Gates], Association]
 
@@ -108,7 +107,7 @@ def _prior_costs(
 ) -> Float:
     """(k, len(chosen)) cost of each pair alone, inf beyond its gate."""
     gate = gates.single()
-    return pairs.distances(
+    return distances(
         state.pose,
         state.landmarks[chosen],
         kernels.gather(state.error_covariance, chosen),

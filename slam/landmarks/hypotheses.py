@@ -12,7 +12,7 @@ from numpy.typing import NDArray
 from slam.settings import Settings, number
 
 MOST_GATE = 1.0 - 1e-15
-TUNED = "training seeds 0-19, tune_ekf (docs/paper/method.md)"
+TUNED = "training seeds 0-19 (docs/paper/method.md)"
 Ints = NDArray[np.int64]
 
 

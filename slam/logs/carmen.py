@@ -41,10 +41,9 @@ from slam import se2
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing
 from slam.frames import MOST_MOUNT_M, NS_PER_S, Float, Frame, Scan, Stream
-from slam.logs.repairs import SHORT_ODOM, Repairs
+from slam.logs.repairs import SHORT_ODOM, Repairs, digits_of
 from slam.logs.scan_log import ScanLog, stream_of
 from slam.logs.scan_poses import Beams, LaserMessage, PoseMessage
-from slam.logs.stamps import digits_of
 from slam.logs.text import (
     MAX_BEAMS,
     MAX_COORDINATE,

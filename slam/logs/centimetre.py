@@ -18,10 +18,9 @@ from pathlib import Path
 
 from slam.errors import LogFormatError
 from slam.frames import Stream
-from slam.logs.repairs import Repairs
+from slam.logs.repairs import Repairs, digits_of
 from slam.logs.scan_log import ScanLog, stream_of
 from slam.logs.scan_poses import LaserMessage, PoseMessage
-from slam.logs.stamps import digits_of
 from slam.logs.text import (
     MAX_BEAMS,
     MAX_RANGE_M,

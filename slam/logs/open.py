@@ -73,7 +73,7 @@ def open_log(
     """The log at ``path`` as a stream of frames, whatever its format.
 
     strict       refuse what would be repaired: torn lines, a clock that steps back, no odometry
-    text_format  a TOML file that describes the columns of a text log (``slam.logs.rover_format``);
+    text_format  a TOML file that describes the columns of a text log (``slam.logs.rover``);
                  without it, the format follows from what is in the file
 
     Raises ``LogFormatError`` when the file is missing, damaged or of no known format.

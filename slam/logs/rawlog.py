@@ -16,10 +16,9 @@ from slam import se2
 from slam.errors import LogFormatError, MissingPathError
 from slam.frames import Float, Stream
 from slam.logs.rawlog_objects import MoveObject, Object, Objects, OdometryObject, ScanObject, Torn
-from slam.logs.repairs import TORN_LINE, Repairs
+from slam.logs.repairs import FINE_DIGITS, TORN_LINE, Repairs
 from slam.logs.scan_log import ScanLog, stream_of
 from slam.logs.scan_poses import Beams, LaserMessage, PoseMessage
-from slam.logs.stamps import FINE_DIGITS
 from slam.logs.text import MAX_COORDINATE, MAX_RANGE_M, Pose
 from slam.logs.unpacking import MAX_RAWLOG_BYTES
 

@@ -14,7 +14,7 @@ import numpy as np
 from slam.constant_velocity import standing
 from slam.errors import LogFormatError
 from slam.frames import Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
-from slam.logs.repairs import NO_ODOMETRY, Repairs
+from slam.logs.repairs import NO_ODOMETRY, Ordered, Repairs, put_in_order
 from slam.logs.scan_poses import (
     LaserMessage,
     PoseMessage,
@@ -24,7 +24,6 @@ from slam.logs.scan_poses import (
     rough_steps,
     scan_poses,
 )
-from slam.logs.stamps import Ordered, put_in_order
 from slam.logs.text import about
 
 DEFAULT_RANGE_MAX_M = 80.0  # CARMEN's own guess for FLASER

@@ -15,8 +15,7 @@ import numpy as np
 from slam import se2
 from slam.errors import LogFormatError
 from slam.frames import Float
-from slam.logs.repairs import STAMPS_SPREAD, Repairs
-from slam.logs.stamps import continued, put_in_order, unwrapped
+from slam.logs.repairs import STAMPS_SPREAD, Repairs, continued, put_in_order, unwrapped
 from slam.logs.text import Pose
 
 MOUNT_TOLERANCE = 5e-3  # m, rad: six printed digits of a coordinate in the hundreds

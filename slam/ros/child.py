@@ -12,7 +12,7 @@ from contextlib import suppress
 from pathlib import Path
 
 from slam.errors import InvalidValueError, SlamFailedError
-from slam.guests.guarding import Guard
+from slam.guests.wire import Guard
 from slam.names import child_environment
 from slam.ros.link import MOST_DOMAIN, domain_of_environment, open_to_others
 

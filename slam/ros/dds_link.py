@@ -93,23 +93,20 @@ class DdsLink:
 
     def __init__(self, domain: int, namespace: str) -> None:
         self._participant, self._namespace = DomainParticipant(domain), namespace
-        self._topics: dict[str, DdsTopic[Any]] = {}
-        self._writers: dict[str, DataWriter[Any]] = {}
-        self._readers: dict[str, DataReader[Any]] = {}
+        self._writers: dict[Topic, DataWriter[Any]] = {}
+        self._readers: dict[Topic, DataReader[Any]] = {}
         self._waits = WaitSet(self._participant)
         self._conditions: list[ReadCondition] = []
 
     def _topic(self, topic: Topic) -> DdsTopic[Any]:
-        if topic.name not in self._topics:
-            name = f"rt{topic.within(self._namespace)}"
-            self._topics[topic.name] = DdsTopic(self._participant, name, _kind(topic.kind))
-        return self._topics[topic.name]
+        name = f"rt{topic.within(self._namespace)}"
+        return DdsTopic(self._participant, name, _kind(topic.kind))
 
     def _writer(self, topic: Topic) -> DataWriter[Any]:
-        if topic.name not in self._writers:
+        if topic not in self._writers:
             own = self._topic(topic)
-            self._writers[topic.name] = DataWriter(self._participant, own, qos=_qos(topic))
-        return self._writers[topic.name]
+            self._writers[topic] = DataWriter(self._participant, own, qos=_qos(topic))
+        return self._writers[topic]
 
     def advertise(self, topic: Topic) -> None:
         """Show that messages will come."""
@@ -121,17 +118,17 @@ class DdsLink:
 
     def subscribe(self, topic: Topic) -> None:
         """Listen from now on."""
-        if topic.name in self._readers:
+        if topic in self._readers:
             return
         reader = DataReader(self._participant, self._topic(topic), qos=_qos(topic))
-        self._readers[topic.name] = reader
+        self._readers[topic] = reader
         self._conditions.append(ReadCondition(reader, _UNREAD))
         self._waits.attach(self._conditions[-1])
 
     def take(self, topic: Topic) -> list[Taken]:
         """What has come since it was last asked."""
         self.subscribe(topic)
-        found = ddspy_take(self._readers[topic.name]._ref, _ANY, _MOST)
+        found = ddspy_take(self._readers[topic]._ref, _ANY, _MOST)
         if isinstance(found, int):
             return []
         return [
@@ -154,5 +151,4 @@ class DdsLink:
         self._waits, self._conditions = WaitSet(self._participant), []
         self._readers.clear()
         self._writers.clear()
-        self._topics.clear()
         del self._waits, self._participant

@@ -11,17 +11,17 @@ import numpy as np
 from slam import se2
 from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Raster
-from slam.frames import NS_PER_S, Float
+from slam.frames import Float
 from slam.logs import unpacking
-from slam.logs.bag_frames import PLANAR, planar
-from slam.ros.template import EPOCH_NS, STORE
+from slam.logs.bag import PLANAR, planar, stamp_of
+from slam.ros.template import STORE
 
 MOST_CELLS = 1 << 26  # of a map: a square of 400 m at 5 cm
 unpacking.bound_rosbags()
 
 
 class StampedPose(NamedTuple):
-    """A pose at a time of the simulation, ns; its covariance (3, 3), None where none is stated."""
+    """A pose, and when it was so as its message says; covariance (3, 3), None: none is stated."""
 
     stamp_ns: int
     pose: Float
@@ -38,11 +38,6 @@ def decoded(kind: str, data: bytes) -> Any:
         raise InvalidValueError(f"{len(data)} bytes that are no {kind}: {error!s:.80}") from error
 
 
-def simulated_ns(header: Any) -> int:
-    """Time of a header since second 0 of the simulation, as ``Template.stamp`` wrote it."""
-    return int(header.stamp.sec) * NS_PER_S + int(header.stamp.nanosec) - EPOCH_NS
-
-
 def transform_of(message: Any, parent: str, child: str) -> StampedPose | None:
     """That transform of a tf2_msgs/TFMessage; None where it has none."""
     for link in message.transforms:
@@ -50,7 +45,7 @@ def transform_of(message: Any, parent: str, child: str) -> StampedPose | None:
         if names == (parent, child):
             moved = link.transform
             pose = SimpleNamespace(position=moved.translation, orientation=moved.rotation)
-            return StampedPose(simulated_ns(link.header), planar(pose))
+            return StampedPose(stamp_of(link, 0), planar(pose))
     return None
 
 
@@ -58,7 +53,7 @@ def pose_of(message: Any) -> StampedPose:
     """A geometry_msgs/PoseWithCovarianceStamped; all zeros as covariance state nothing."""
     spread = np.asarray(message.pose.covariance)[PLANAR].astype(np.float64)
     said = spread if np.isfinite(spread).all() and spread.any() else None
-    return StampedPose(simulated_ns(message.header), planar(message.pose.pose), said)
+    return StampedPose(stamp_of(message, 0), planar(message.pose.pose), said)
 
 
 def raster_of(grid: Any, T_own_map: Float) -> Raster | None:

@@ -27,10 +27,11 @@ class Topic:
     """A topic and its quality of service.
 
     name   as ROS has it: "/scan"; a namespace comes before it, but for names of ROS itself
-    kind   "sensor_msgs/msg/LaserScan"
+    kind   "sensor_msgs/msg/LaserScan"; of two kinds under one name each is a topic of its own
     reliable  sent again until it is received, else best effort
     latched   the last message is kept for who comes later (transient local)
     depth     messages that are kept for a slow reader
+    waits     whether publishing over Zenoh may wait for seconds where the network is busy or cut
     """
 
     name: str
@@ -38,6 +39,7 @@ class Topic:
     reliable: bool = True
     latched: bool = False
     depth: int = 10
+    waits: bool = False
 
     def within(self, namespace: str) -> str:
         """Its full name; clock and transforms are the same for all robots."""

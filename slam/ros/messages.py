@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a frame says, as ROS 2 messages.
 
-Stamps are those of the earliest beam, ``EPOCH_NS`` later. Frames are "map", "odom", "base_link"
+Stamps are those of the earliest beam (``template.said_ns``). Frames are "map", "odom", "base_link"
 (REP 105), "base_footprint" (REP 120; here the same place), "laser" and "world", in which the truth
 is; "map" lies on it. LaserScan follows REP 117 (inf no return,
 NaN an error code) and, in its time fields, the driver of the LMS-200 family

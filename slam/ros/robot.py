@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frames import Frame
 from slam.ros.frames import LATCHED, SCANS, STATE, FrameMessages
@@ -29,6 +28,7 @@ def topics(*, paced: bool = False) -> dict[str, Topic]:
             name=_RENAMED.get(name, name),
             kind=kind,
             reliable=paced or name not in _LOSSY,
+            waits=paced,
             latched=latched,
             depth=1 if latched else _DEPTHS.get(name, 10),
         )
@@ -38,32 +38,33 @@ def topics(*, paced: bool = False) -> dict[str, Topic]:
 class Robot:
     """Publishes frames.
 
-    height_m  of the scanner, for /tf_static
-    paced     as of ``topics``
+    paced  as of ``topics``
     """
 
-    def __init__(self, link: Link, *, height_m: float = 0.0, paced: bool = False) -> None:
-        self._link, self._height_m = link, height_m
-        self.topics = topics(paced=paced)
+    def __init__(self, link: Link, *, paced: bool = False) -> None:
+        self._link, self.topics = link, topics(paced=paced)
         for topic in self.topics.values():
             link.advertise(topic)
-        self._messages: FrameMessages | None = None
-        self._map: Raster | None = None
+        self.restart()
 
-    def restart(self, static_map: Raster | None = None, height_m: float | None = None) -> None:
-        """The next frame is the first of another drive; what never moves is /ground_truth/map.
+    def restart(self, static_map: Raster | None = None, height_m: float = 0.0) -> None:
+        """The next frame is the first of another drive.
 
-        height_m  of the scanner from now on; None: as it was
+        static_map  what never moves, for /ground_truth/map
+        height_m    of the scanner, for /tf_static
         """
-        self._messages, self._map = None, static_map
-        self._height_m = self._height_m if height_m is None else height_m
+        self._messages: FrameMessages | None = None
+        self._map, self._height_m = static_map, height_m
 
     def send(self, frame: Frame) -> None:
-        """All messages of a frame; without a scan, only those about its motion."""
+        """All messages of a frame; without a scan, only those about its motion.
+
+        Nothing before the first scan, which says what scanner it is.
+        """
         scan, messages = frame.scan, self._messages
         if messages is None:
             if scan is None:
-                raise InvalidValueError("ROS 2: the first frame has no scan to say its scanner by")
+                return
             messages = self._messages = FrameMessages(
                 scan.spec,
                 height_m=self._height_m,

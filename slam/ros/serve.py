@@ -14,6 +14,7 @@ import sys
 import time
 from collections.abc import Iterator
 from contextlib import closing, contextmanager, suppress
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -22,37 +23,36 @@ from slam import se2
 from slam.answers import asked, asked_map
 from slam.errors import MobiliaError
 from slam.frames import NS_PER_S, Frame
-from slam.logs.bag_frames import Assembly
+from slam.logs.bag import Assembly, stamp_of
 from slam.logs.bag_laser import Laser, mounting
-from slam.logs.bag_topics import INCREMENT, ODOMETRY, SCAN, Topics
-from slam.ros.heard import decoded, simulated_ns
+from slam.logs.bag_topics import Topics
+from slam.ros.heard import decoded
 from slam.ros.link import Link, Topic, open_link
 from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
 from slam.ros.navigation_messages import MapMessage
+from slam.ros.node import GRID, POSES, TF
+from slam.ros.robot import topics
 from slam.ros.template import EPOCH_NS
 from slam.system import SlamSystem, create
 
 MAP_NS = NS_PER_S  # between two maps
 MOST_WAITING = 1000  # messages of a topic, until the first scan and odometry are there
-FIRST_S = 0.1  # that the first scan waits for what comes with it
+FIRST_S = 0.3  # that the first scan waits for what comes with it
 _log = logging.getLogger(__name__)
-_SCAN = Topic(name="/scan", kind=SCAN, reliable=False, depth=100)
-_TURNS = Topic(name="/scan_turn", kind=SCAN, reliable=False, depth=100)
-_ODOM = Topic(name="/odom", kind=ODOMETRY, depth=100)
-_STEPS = Topic(name="/odom_increment", kind=INCREMENT, depth=100)
-_STATIC = Topic(name="/tf_static", kind=TransformMessage.KIND, latched=True)
-_TF = Topic(name="/tf", kind=TransformMessage.KIND, depth=100)
-_POSE = Topic(name="/pose", kind=INCREMENT)
-_MAP = Topic(name="/map", kind=MapMessage.KIND, latched=True, depth=1)
+_SCAN, _TURNS, _ODOM, _STEPS, _STATIC = (
+    replace(topics()[name], depth=100)
+    for name in ("/scan", "/scan_turn", "/odom", "/odom_increment", "/tf_static")
+)
+_TF, _POSE, _MAP = (replace(topic, waits=True) for topic in (TF, POSES[0], GRID))
 _HEARD = (_SCAN, _TURNS, _ODOM, _STEPS, _STATIC)
 
 
 class Served:
-    """One SLAM on a link; frames are put together as out of a bag (``slam.logs.bag_frames``)."""
+    """One SLAM on a link; frames are put together as out of a bag (``slam.logs.bag``)."""
 
     def __init__(self, link: Link, system: SlamSystem) -> None:
         self._link, self._system = link, system
-        for topic in _HEARD:
+        for topic in reversed(_HEARD):  # who waits for a listener to scans has the others, too
             link.subscribe(topic)
         for topic in (_TF, _POSE, _MAP):
             link.advertise(topic)
@@ -97,17 +97,17 @@ class Served:
         for topic in _HEARD[1:]:
             self._waiting[topic] += self._taken(topic)
         first, odometry = self._waiting[_SCAN][0], self._waiting[_ODOM][0]
-        began_ns = simulated_ns(first.header)
+        began_ns = stamp_of(first, 0)
         end_ns = began_ns + round(first.scan_time * NS_PER_S)
-        turns = [t for t in self._waiting[_TURNS] if began_ns <= simulated_ns(t.header) < end_ns]
+        turns = [t for t in self._waiting[_TURNS] if began_ns <= stamp_of(t, 0) < end_ns]
         mount = mounting(self._links, odometry.child_frame_id, first.header.frame_id)
         laser = Laser(first, turns, (np.zeros(3), False) if mount is None else mount)
         steps = _STEPS.name if self._waiting[_STEPS] else None
-        topics = Topics(
+        known = Topics(
             scan=_SCAN.name, odometry=_ODOM.name, truth=None, turns=None, increment=steps,
             labels=None, transforms=(),
         )  # fmt: skip
-        return Assembly(topics, laser, EPOCH_NS)
+        return Assembly(known, laser, EPOCH_NS if began_ns >= EPOCH_NS else 0)
 
     def _answer(self, frame: Frame) -> None:
         estimate = asked(self._system, frame)

@@ -28,6 +28,7 @@ from slam.ros.link import Link, open_link
 from slam.ros.messages import MAP, ODOM
 from slam.ros.node import Node
 from slam.ros.robot import Robot
+from slam.ros.template import said_ns
 from slam.system import register_prefix
 from slam.trajectory import Trajectory
 
@@ -92,15 +93,9 @@ class Ros2Slam:
             raise
         self._waited_s += time.monotonic() - began_s
         node = self._other.node
-        T_map_robot = node.estimate()
-        self._path.add(frame.stamp_ns, T_map_robot)
-        return Estimate(
-            stamp_ns=frame.stamp_ns,
-            T_map_robot=T_map_robot,
-            covariance=node.covariance,
-            converged=node.T_own_odom is not None,
-            diagnostics={"answered": answered, **node.odd},
-        )
+        estimate = node.estimate({"answered": answered, **node.odd})
+        self._path.add(frame.stamp_ns, estimate.T_map_robot)
+        return estimate
 
     def map(self) -> Raster | None:
         """What it says on /map, None where it does not."""
@@ -149,7 +144,7 @@ class _Other:
         """Send a frame; whether it was answered in time."""
         if self._first:
             self._meet()
-        self.node.sent(frame.odometry)
+        self.node.sent(frame.odometry, said_ns(frame.stamp_ns))
         self._robot.send(frame)
         answered = frame.scan is None
         deadline = time.monotonic() + ANSWER_S

@@ -24,6 +24,7 @@ _STAMP = (0x5EC0ACED, 0x3ABB0ACE)
 # stamp near 0 for "the latest" or for a clock that nobody has set. Round, so that people see the
 # simulated second in a stamp; the same for every bag, so that bags stay the same bytes.
 EPOCH_NS = 1_700_000_000 * NS_PER_S
+UNIX_NS = 400_000_000 * NS_PER_S  # stamps of logs from here on (1982) are such times already
 STORE = get_typestore(Stores.ROS2_HUMBLE)  # the types used here are the same in later ones
 
 
@@ -69,8 +70,13 @@ def marked_time() -> Any:
 
 def time_of(stamp_ns: int) -> Any:
     """The time of a frame as a bag says it, for the header of a topic of your own."""
-    seconds, nanoseconds = divmod(stamp_ns + EPOCH_NS, NS_PER_S)
+    seconds, nanoseconds = divmod(said_ns(stamp_ns), NS_PER_S)
     return message("builtin_interfaces/msg/Time", sec=seconds, nanosec=nanoseconds)
+
+
+def said_ns(stamp_ns: int) -> int:
+    """What a message says for the stamp of a frame, ns: its seconds must fit 31 bits."""
+    return stamp_ns if stamp_ns >= UNIX_NS else stamp_ns + EPOCH_NS
 
 
 class Marks:
@@ -119,9 +125,9 @@ class Template:
     def stamp(self, stamp_ns: int) -> bytearray:
         """Set every stamp of the message; its bytes, valid until the next change.
 
-        stamp_ns  of the simulation; the message says ``EPOCH_NS`` more
+        stamp_ns  of a frame; the message says ``said_ns``
         """
-        seconds, nanoseconds = divmod(stamp_ns + EPOCH_NS, NS_PER_S)
+        seconds, nanoseconds = divmod(said_ns(stamp_ns), NS_PER_S)
         for view in self._stamps:
             view[0], view[1] = seconds, nanoseconds
         return self.data

@@ -20,6 +20,7 @@ from typing import Any
 
 import zenoh
 import zenoh.ext
+import zenoh.handlers
 
 from slam.errors import InvalidValueError
 from slam.ros.link import NODE, Taken, Topic, open_to_others, type_name
@@ -83,11 +84,11 @@ class ZenohLink:
         self._session, self._domain, self._namespace = session, domain, namespace
         self._id, self._entities = str(session.info.zid()), itertools.count(1)
         self._tokens = [session.liveliness().declare_token(f"{self._token('NN', 0)}")]
-        self._publishers: dict[str, tuple[Any, bytes]] = {}
-        self._numbers: dict[str, int] = {}
+        self._publishers: dict[Topic, tuple[Any, bytes]] = {}
+        self._numbers: dict[Topic, int] = {}
         self._own: set[bytes] = set()
-        self._subscribers: dict[str, Any] = {}
-        self._come: dict[str, deque[Taken]] = {}
+        self._subscribers: dict[Topic, Any] = {}
+        self._come: dict[Topic, deque[Taken]] = {}
         self._some = Condition()
 
     def _token(self, kind: str, entity: int) -> str:
@@ -108,10 +109,10 @@ class ZenohLink:
         self._tokens.append(self._session.liveliness().declare_token("/".join(words)))
 
     def _publisher(self, topic: Topic) -> tuple[Any, bytes]:
-        if topic.name not in self._publishers:
+        if topic not in self._publishers:
             control = zenoh.CongestionControl
             options: dict[str, Any] = {
-                "congestion_control": control.BLOCK if topic.reliable else control.DROP
+                "congestion_control": control.BLOCK if topic.waits else control.DROP
             }
             if topic.latched:
                 options |= {
@@ -124,9 +125,9 @@ class ZenohLink:
                 made = self._session.declare_publisher(self._key(topic), **options)
             sender = struct.pack("<QQ", next(_gids), time.time_ns())
             self._own.add(sender)
-            self._publishers[topic.name] = (made, sender)
+            self._publishers[topic] = (made, sender)
             self._declare("MP", topic)
-        return self._publishers[topic.name]
+        return self._publishers[topic]
 
     def advertise(self, topic: Topic) -> None:
         """Show that messages will come."""
@@ -135,15 +136,15 @@ class ZenohLink:
     def publish(self, topic: Topic, data: bytes) -> None:
         """Send a message."""
         publisher, sender = self._publisher(topic)
-        number = self._numbers[topic.name] = self._numbers.get(topic.name, 0) + 1
+        number = self._numbers[topic] = self._numbers.get(topic, 0) + 1
         attachment = struct.pack("<qqB", number, time.time_ns(), len(sender)) + sender
         publisher.put(bytes(data), attachment=attachment)
 
     def subscribe(self, topic: Topic) -> None:
         """Listen from now on; to what was kept, too, where the topic is latched."""
-        if topic.name in self._subscribers:
+        if topic in self._subscribers:
             return
-        come = self._come[topic.name] = deque[Taken](maxlen=max(topic.depth, 1))
+        come = self._come[topic] = deque[Taken](maxlen=max(topic.depth, 1))
 
         def heard(sample: Any) -> None:
             attached = sample.attachment
@@ -154,21 +155,25 @@ class ZenohLink:
                 come.append(Taken(sample.payload.to_bytes(), sender.hex()))
                 self._some.notify()
 
+        # in the thread that receives: one a topic would lose the order in which they were sent
+        handler = zenoh.handlers.Callback(heard, indirect=False)
         remote = zenoh.Locality.REMOTE
         if topic.latched:
             history = zenoh.ext.HistoryConfig(detect_late_publishers=True, max_samples=topic.depth)
             made = zenoh.ext.declare_advanced_subscriber(
-                self._session, self._key(topic), heard, history=history, allowed_origin=remote
+                self._session, self._key(topic), handler, history=history, allowed_origin=remote
             )
         else:
-            made = self._session.declare_subscriber(self._key(topic), heard, allowed_origin=remote)
-        self._subscribers[topic.name] = made
+            made = self._session.declare_subscriber(
+                self._key(topic), handler, allowed_origin=remote
+            )
+        self._subscribers[topic] = made
         self._declare("MS", topic)
 
     def take(self, topic: Topic) -> list[Taken]:
         """What has come since it was last asked."""
         self.subscribe(topic)
-        come = self._come[topic.name]
+        come = self._come[topic]
         with self._some:
             found = list(come)
             come.clear()

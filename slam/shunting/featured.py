@@ -95,8 +95,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
         if frame.scan is not None:  # its beams are no features
             features = frame.features
             if features is None:
-                numbers = self.config.features.corners
-                features = corners(frame.scan, twist=frame.odometry.twist, config=numbers)
+                features = corners(frame.scan, twist=frame.odometry.twist)
                 self._gates = self.config.features.corner_gates
             frame = dataclasses.replace(frame, scan=None, labels=None, features=features)
         return super().update(frame)

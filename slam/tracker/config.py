@@ -12,9 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from slam.errors import InvalidValueError
-from slam.frontend.config import FrontendConfig
-from slam.frontend.corner_config import CornerConfig
-from slam.frontend.range_error_config import RangeErrorConfig
+from slam.frontend.config import FrontendConfig, RangeErrorConfig
 from slam.landmarks.hypotheses import Gates
 from slam.settings import Settings, number, word
 from slam.tracker.belief.config import BeliefConfig
@@ -37,7 +35,6 @@ class FeaturesConfig(Settings):
     least_m2: float = number(1e-6, "m²", "least variance", "numerical guard: (1 mm)²", low=1e-15)
     looks_twice: float = number(1.5, "looks", "peaks with more are associated first")
     steps: int = number(20, "frames", "frames whose median step is one look", low=1, high=100_000)
-    corners: CornerConfig = field(default=CornerConfig())
     gates: Gates = field(default=Gates())
     corner_gates: Gates = field(default=Gates(individual=0.999, joint=0.99, posterior=0.95))
 
@@ -61,6 +58,15 @@ class TrackerConfig(Settings):
         "tracking.freeze_below": "carried_per_h",
         "tracking.quality.give_up_s": "tracking.give_up_s",
         "standing.doubtful_m": "standing.alert_m",
+    }
+    constants: ClassVar[Mapping[str, str]] = {
+        "frontend": "slam.frontend.observations",
+        "frontend.surfaces": "slam.frontend.surfaces",
+        "frontend.view": "slam.frontend.visibility",
+        "frontend.prior": "slam.frontend.odometry_prior",
+        "frontend.bias": "slam.frontend.odometry_prior",
+        "features.corners": "slam.frontend.corners",
+        "range_error": "slam.frontend.range_error",
     }
 
     cell_m: float = number(

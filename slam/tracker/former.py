@@ -6,8 +6,13 @@ from __future__ import annotations
 from collections.abc import Mapping
 from typing import Any
 
-_GROUPS = {"tracking": ("quality", "verdict")}
+_GROUPS = {
+    "tracking": ("quality", "verdict"),
+    "frontend": ("surfaces", "view", "prior"),
+    "features": ("corners",),
+}
 _NUMBERS: dict[str, tuple[str, ...]] = {
+    "frontend": ("spacing_m", "least_weight"),
     "standing": (
         "better", "doubtful_m", "explains", "fallen", "fallen_s", "outvoted", "rival_gain",
         "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans", "undecided_s",
@@ -19,6 +24,8 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
         "slipped_rad", "sure",
     ),
 }  # fmt: skip
+
+_LEFT = {"frontend.bias": ("per_m", "per_rad"), "range_error": ("learn",)}  # all others are gone
 
 
 def updated(words: Any) -> Any:
@@ -41,5 +48,5 @@ def _without(words: Mapping[str, Any], path: str) -> dict[str, Any]:
     return {
         name: _without(value, f"{path}.{name}".lstrip(".")) if isinstance(value, Mapping) else value
         for name, value in words.items()
-        if name not in gone
+        if name not in gone and name in _LEFT.get(path, words)
     }

@@ -19,7 +19,15 @@ from slam import se2
 from slam.frames import Float, Frame
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import inverted
-from slam.frontend.range_error import RangeCorrection, RangeError
+from slam.frontend.range_error import (
+    DRIFT_M,
+    DRIFT_RAD,
+    REDRAW_BY_M,
+    REDRAW_M,
+    REDRAWN_KEYS,
+    RangeCorrection,
+    RangeError,
+)
 from slam.posegraph import carried
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
@@ -46,13 +54,12 @@ class LearntRanges(RangeCorrection):
     def __init__(
         self, config: TrackerConfig, matcher: Matcher, new_map: Callable[[], CellMap]
     ) -> None:
-        super().__init__(config.range_error, config.frontend.sensor_sigma_m)
+        super().__init__(config.frontend.sensor_sigma_m)
         self._map_config, self._matcher, self._new_map = config.map, matcher, new_map
         self._taken: list[Float] = []  # coefficients taken off each key frame
         self._drawn = self._used = self.applied  # by the present map; by the newest frame
         self._new: _NewMap | None = None
-        drift = [config.range_error.drift_m**2] * 2 + [config.range_error.drift_rad**2]
-        self._precision = inverted(np.diag(drift))
+        self._precision = inverted(np.diag([DRIFT_M**2, DRIFT_M**2, DRIFT_RAD**2]))
 
     def seen(self, frame: Frame) -> Frame:
         """The frame with the error taken off its ranges; itself while there is none."""
@@ -63,15 +70,15 @@ class LearntRanges(RangeCorrection):
         """The map drawn anew, if it is ready; else a few key frames more are drawn."""
         keys = loops.keys
         self._taken += [self._used] * (len(keys) - len(self._taken))
-        if loops.poses or loops.way_m > self.config.redraw_m:  # its loops hold the map together
+        if loops.poses or loops.way_m > REDRAW_M:  # its loops hold the map together
             self._new = None
             return None
         if self._new is None:
-            if self.error.differ_m(self.applied, self._drawn) >= self.config.redraw_by_m:
+            if self.error.differ_m(self.applied, self._drawn) >= REDRAW_BY_M:
                 self._drawn = self.applied
                 self._new = _NewMap(self._new_map(), [], [])
             return None
-        for _ in range(self.config.redrawn_keys):
+        for _ in range(REDRAWN_KEYS):
             if len(self._new.poses) == len(keys):
                 new, self._new = self._new, None
                 return _moved(new, keys, poses())

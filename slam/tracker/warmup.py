@@ -15,7 +15,7 @@ from typing import Any
 
 import numpy as np
 
-from slam.compiling import announced
+from slam._jit import announced
 from slam.frames import NS_PER_S, LaserSpec, Scan
 from slam.frontend.observations import Observations, from_scan
 from slam.tracker.cell_map import CellMap

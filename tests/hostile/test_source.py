@@ -28,25 +28,24 @@ IMPORTERS = {
     "scripts/cli.py": "verbs of ours, by constants",
     "scripts/option_names.py": "names to complete, by constants",
     "slam/ros/link.py": "the two middlewares, by constants",
+    "slam/settings.py": "homes of constants, by constants",
     "scripts/live/served.py": "viser, by a constant",
     "scripts/live/replay.py": "the same",
     "scripts/live/page.py": "the same",
     "scripts/live/gate.py": "what viser's messages are read with",
     "scripts/verbs/reproduce.py": "experiments of ours",
-    "scripts/paper/runs.py": "jobs of ours",
     "scripts/experiments/study.py": "runs of ours",
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
     "slam/guests/guard.py": ["marshal"],
-    "slam/guests/guarding.py": ["marshal"],
+    "slam/guests/wire.py": ["marshal"],
 }
 STARTERS = {
-    "slam/guests/guarding.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
+    "slam/guests/wire.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
     "sim/view/gl.py": "our own Python, without the working folder",
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/result_files.py": "git, for the commit of a results file",
-    "scripts/experiments/covariance_scores.py": "smfeval, as the user names it",
 }
 
 

@@ -108,3 +108,24 @@ def test_a_seat_of_an_unknown_kind_is_named_before_anything_runs(tmp_path):
     )
     with pytest.raises(InvalidValueError, match=r"shed\.xml.*'seat:chair:0'.*chair_swivel"):
         scenes.build(str(plan))
+
+
+SHED = """<mujoco><worldbody>
+  <geom name="wall:north" class="wall" pos="0 2.1 0.55" size="3.2 0.1 0.55"/>
+  <site name="room:shed" type="box" size="3 2 0.01"/> <site name="start:robot" pos="-2 0 0"/>
+  <site name="put:chair_swivel" pos="1 1 0"/> <site name="put:desk" pos="0 1.5 0"/>
+</worldbody></mujoco>"""
+
+
+def test_a_mark_puts_furniture_by_kind_and_place(tmp_path):
+    plan = tmp_path / "shed.xml"
+    plan.write_text(SHED)
+    for scene in (scenes.build(str(plan), 1), scenes.filled(plan, 1)):
+        assert [(m.name, m.kind) for m in scene.movers] == [
+            ("chair0", "chair_swivel"), ("robot", "robot"),
+        ]  # fmt: skip
+        assert scene.initial["chair0"][:2] == (1.0, 1.0)
+        assert scene.spec.body("desk0/base") is not None
+    plan.write_text(SHED.replace("chair_swivel", "chair"))
+    with pytest.raises(InvalidValueError, match="'put:chair' has the unknown kind 'chair'"):
+        scenes.build(str(plan), 1)

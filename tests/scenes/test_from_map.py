@@ -104,6 +104,17 @@ def test_the_files_are_a_scene_and_each_part_can_be_switched_off(tmp_path):
     assert [m.kind for m in scenes.build(name, 1).movers] == ["door", "robot"]
 
 
+def test_a_start_that_rooms_of_a_turned_map_leave_out_has_its_own(tmp_path):
+    raster = two_rooms(math.radians(45.0))
+    corner = (0.45 + 0.05 * 20, 0.45 + 0.05 * 20)  # of the building, in the frame of the cells
+    x, y = se2.transform(raster.T_map_origin, np.array([corner]))[0].tolist()
+    made = plan(raster, FromMap(start=(x, y, 0.0)))
+    assert made.start[:2] == (x, y)
+    assert scenes.build(str(write(made, tmp_path / "lab")), 1).start[:2] == pytest.approx(
+        (x, y), abs=1e-3
+    )
+
+
 def model_bytes(scene: scenes.Scene) -> bytes:
     """The compiled model."""
     model = scene.compile()

@@ -10,11 +10,11 @@ import numpy as np
 import pytest
 
 import scenes
+from scenes.assembly import file_of
 from scenes.kinds import KINDS, Feet, KindOfMover
-from scenes.mjcf import file_of
 from scenes.scene import Mover
-from sim.actors.castors import stand_on_castors
-from sim.recording.objects import ObjectsMessage
+from sim.actors.chairs import stand_on_castors
+from sim.recording.topics import ObjectsMessage
 from slam.errors import UnknownNameError
 
 ROOT = Path(__file__).parents[2]

@@ -11,7 +11,7 @@ import numpy as np
 import pytest
 
 import scenes.assembly
-from scenes import textures
+from scenes import look
 from scenes.kinds import KINDS
 from scenes.placement import Floor, gap_to_boxes
 
@@ -98,9 +98,9 @@ def test_a_laser_meets_a_board_over_its_whole_length_and_a_bed_at_ends_and_colum
     assert seen_across("couch", 0.0) == pytest.approx(0.36)
 
 
-@pytest.mark.parametrize("material", sorted(textures.PAINTERS))
+@pytest.mark.parametrize("material", sorted(look.PAINTERS))
 def test_a_floor_tile_wraps_round_without_a_seam(material):
-    data, n, size_m = textures.floor(material)
+    data, n, size_m = look.floor(material)
     image = np.frombuffer(data, np.uint8).reshape(n, n, 3).astype(float)
     assert size_m > 0
     assert image.std() > 1.0

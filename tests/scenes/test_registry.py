@@ -87,7 +87,7 @@ CRATE = """<mujoco model="crate"><worldbody><body name="base">
 
 
 def test_a_scene_of_ones_own_needs_no_change_here(tmp_path, monkeypatch):
-    plans = scenes.mjcf.file_of("plans", "blank").parent
+    plans = scenes.assembly.file_of("plans", "blank").parent
     (tmp_path / "my_pkg").mkdir()
     (tmp_path / "my_pkg/__init__.py").write_text(PLUGIN)
     (tmp_path / "my_pkg/crate.xml").write_text(CRATE)

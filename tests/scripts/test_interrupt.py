@@ -29,6 +29,31 @@ def test_a_signal_unwinds(number):
     assert said_after(number, [sys.executable, "-c", CODE.format(seconds=60)]) == "unwound"
 
 
+COMPILING = """
+import time
+from scripts import interrupt
+
+interrupt.install()
+at_work = {"__name__": "llvmlite.binding.ffi", "time": time}
+try:
+    exec(
+        "print('ready', flush=True)\\n"
+        "end = time.monotonic() + 1.0\\n"
+        "while time.monotonic() < end: time.sleep(0.01)\\n"
+        "print('compiled', flush=True)",
+        at_work,
+    )
+    time.sleep(60)
+except interrupt.InterruptedBySignal:
+    print("unwound")
+"""
+
+
+def test_a_signal_waits_for_llvm():
+    words = [sys.executable, "-c", COMPILING]
+    assert said_after(signal.SIGTERM, words) == "compiled\nunwound"
+
+
 def test_the_end_of_the_terminal_is_ignored_under_nohup():
     words = ["nohup", sys.executable, "-c", CODE.format(seconds=0.5)]
     assert said_after(signal.SIGHUP, words) == "undisturbed"

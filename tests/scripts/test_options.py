@@ -22,7 +22,7 @@ from scripts.comparison.plan import Plan
 from scripts.debugger.episode import Case
 from scripts.debugger.recording import Checkpoint, record
 from scripts.film.footage import open_run, title_of
-from scripts.options import Axis, Held, chosen, every_of
+from scripts.options import Axis, Held, axis_levels, every_of
 from scripts.report.study import study
 from scripts.results import check
 from sim.core.dynamism import Dynamism
@@ -79,15 +79,18 @@ def test_a_dataset_of_one_motion_reads_back_and_sweeps_change(tmp_path: Path):
 
 
 def test_the_axis_is_what_has_several_levels():
-    assert chosen((0.0, 1.0), (), ()) == ("dynamism", (0.0, 1.0), {})
-    assert chosen((0.0, 1.0), (), (0.2,)) == ("dynamism", (0.0, 1.0), {"change": 0.2})
-    assert chosen((), (0.0, 1.0), ()) == ("motion", (0.0, 1.0), {})
-    assert chosen((), (0.3,), (0.0, 1.0)) == ("change", (0.0, 1.0), {"motion": 0.3})
-    assert chosen((), (), (0.4,)) == ("change", (0.4,), {})
+    assert axis_levels(["0", "1"], None, None) == ("dynamism", (0.0, 1.0), {})
+    assert axis_levels(["0", "1"], None, ["0.2"]) == ("dynamism", (0.0, 1.0), {"change": 0.2})
+    assert axis_levels(None, ["0:1:1"], None) == ("motion", (0.0, 1.0), {})
+    assert axis_levels(None, ["0.3"], ["0", "1"]) == ("change", (0.0, 1.0), {"motion": 0.3})
+    assert axis_levels(None, None, ["0.4"]) == ("change", (0.4,), {})
+    assert axis_levels(None, ["0.8"], None, ["0", "4"]) == ("people", (0.0, 4.0), {"motion": 0.8})
+    assert Axis(name="people").at(4.0) == {"dynamism": 0.0, "motion": 0.5, "change": None}
+    assert Axis(name="people").crowd(4.0) == "escorts:4"
     with pytest.raises(InvalidValueError, match="--motion and --change"):
-        chosen((), (0.0, 1.0), (0.0, 1.0))
+        axis_levels(None, ["0", "1"], ["0", "1"])
     with pytest.raises(InvalidValueError, match="--dynamism sets both"):
-        chosen((0.5,), (0.0, 1.0), ())
+        axis_levels(["0.5"], ["0", "1"], None)
 
 
 def test_levels_of_one_axis_leave_the_other_at_0_or_as_it_is_held():

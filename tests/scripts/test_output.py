@@ -198,16 +198,11 @@ def test_a_failure_leaves_no_lock(tmp_path: Path, failure: BaseException):
         failing(tmp_path / "out")
 
 
-def test_what_killed_runs_left_is_removed_or_put_back(tmp_path: Path):
-    make(tmp_path / "run", "one")
+def test_what_killed_runs_left_is_removed(tmp_path: Path):
     (tmp_path / ".run.17.part").mkdir()
     (tmp_path / ".run.17.part" / "half").touch()
     (tmp_path / ".run2.17.part").mkdir()
-    (tmp_path / "run").rename(tmp_path / ".run.17.old")
-    with pytest.raises(OutputError, match="holds another run"):
-        make(tmp_path / "run", "two")
-    assert (tmp_path / "run" / "data.txt").read_text() == "one"
-    make(tmp_path / "run", "two", overwrite=True)
+    make(tmp_path / "run", "two")
     assert sorted(p.name for p in tmp_path.iterdir()) == [".run2.17.part", "run"]
 
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Frames from the moving world: one seed, same bytes, and what a frame says is when it says."""
+"""Frames and moments of the moving world: one seed, same bytes; each says what is, and when."""
 
 from __future__ import annotations
 
@@ -11,11 +11,12 @@ import numpy as np
 import pytest
 
 from sim.core.seeds import Seeds
+from sim.moments import Moment, thinned
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, stream, tour
 from slam import create, se2
 from slam.errors import InvalidValueError, UnknownNameError
-from slam.frames import BeamClass
+from slam.frames import BeamClass, Frame, Odometry
 
 DIGEST = """
 import hashlib, sys
@@ -200,3 +201,24 @@ def test_ceiling_cameras_know_the_robot_late_and_by_centimetres():
     assert 0.001 < np.median(gaps) < 0.1
     with pytest.raises(InvalidValueError, match="tags must be"):
         Simulation("arena", tags="gps")
+
+
+def moments(stated):
+    for k, part in enumerate(stated):
+        covariance = None if part is None else np.diag([part, part, part])
+        odometry = Odometry(stamp_ns=k, T_odom_robot=np.zeros(3), increment_covariance=covariance)
+        frame = Frame(stamp_ns=k, odometry=odometry)
+        yield Moment(frame=frame, poses=np.zeros((0, 3)), moving=np.zeros(0, dtype=np.bool_))
+
+
+@pytest.mark.parametrize(
+    ("stated", "kept"),
+    [
+        ([0.5, 1.0, 2.0, 4.0, 8.0], [0.5, 3.0, 12.0]),
+        ([None, 1.0, 2.0, None, 4.0], [None, 3.0, None]),
+        ([None] * 3, [None, None]),
+    ],
+)
+def test_covariances_are_added_up_and_none_stays_none(stated, kept):
+    found = [moment.frame.odometry.increment_covariance for moment in thinned(moments(stated), 2)]
+    assert [None if c is None else c[0, 0] for c in found] == kept

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Files appear whole or not at all."""
+"""Files appear whole or not at all, and cells of a CSV are no formulas."""
 
 from __future__ import annotations
 
@@ -7,10 +7,22 @@ import errno
 import os
 
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
 
 from slam import files
 from slam.errors import MobiliaError, OutputError
-from slam.files import exchange, is_part, locked, reason, replacing, write_bytes, write_text
+from slam.files import (
+    cell_of,
+    exchange,
+    is_part,
+    locked,
+    reason,
+    replacing,
+    word_of,
+    write_bytes,
+    write_text,
+)
 
 
 def tree(folder):
@@ -142,3 +154,22 @@ def test_a_full_disk_is_called_one_whatever_the_writer_said(tmp_path, monkeypatc
 def test_names_of_what_is_unfinished():
     assert all(map(is_part, (".a.1.part", ".a.host.1.part", ".a.1.part.npz")))
     assert not any(map(is_part, ("a.part", ".a", ".apart", "a.1.part.npz", ".tables.ready")))
+
+
+@pytest.mark.parametrize("word", ["=1+1", "+cmd", "-cmd", "@SUM(A1)", "\tx", "\rx", "=", "'=x"])
+def test_what_a_spreadsheet_would_compute_is_text(word):
+    assert cell_of(word) == f"'{word}"
+    assert word_of(cell_of(word)) == word
+
+
+@pytest.mark.parametrize("word", ["-0.5", "+1", "-1e-05", "-inf", "", "nan", "a=b", "it's", "'tis"])
+def test_numbers_and_other_words_stay_as_they_are(word):
+    assert cell_of(word) == word_of(word) == word
+
+
+@given(st.text(st.sampled_from("'=+-@\t\r1.e a") | st.characters(), max_size=8))
+def test_every_word_comes_back(word):
+    cell = cell_of(word)
+    assert word_of(cell) == word
+    if cell.startswith(tuple("=+-@\t\r")):
+        float(cell)

@@ -1,15 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The compile cache must notice a change in a kernel that another module calls."""
+"""The compile cache notices a change in a kernel of another module; compiling is said once."""
 
 from __future__ import annotations
 
+import gc
+import logging
 import os
 import pickle
 import subprocess
 import sys
 from pathlib import Path
 
+import numba
 import pytest
+
+from slam._jit import announced
 
 CALLEE = """
 from slam._jit import {} as jit
@@ -73,3 +78,32 @@ def test_a_cache_that_names_types_which_are_gone_is_an_empty_cache(tmp_path):
         version = pickle.load(file)
     indices[0].write_bytes(pickle.dumps(version) + b"cslam.errors\nGone\n.")
     assert run(tmp_path, "njit", 1.0) == 2.0
+
+
+def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptureFixture) -> None:
+    @numba.njit
+    def twice(x: int) -> int:
+        return 2 * x
+
+    with caplog.at_level(logging.INFO, logger="slam._jit"):
+        with announced("the test's kernel"):
+            assert not gc.isenabled()
+            assert twice(2) == 4
+            assert twice(0.5) == 1.0  # compiled again, for another type
+        assert [r.message for r in caplog.records] == [
+            "compiling the test's kernel, which takes some seconds the first time"
+        ]
+        with announced("the test's kernel"):
+            twice(3)
+        assert len(caplog.records) == 1
+    assert gc.isenabled()
+
+
+def test_the_collector_is_left_as_it_was_whatever_happens() -> None:
+    gc.disable()
+    try:
+        with pytest.raises(ZeroDivisionError), announced("nothing"):
+            raise ZeroDivisionError
+        assert not gc.isenabled()
+    finally:
+        gc.enable()

@@ -214,3 +214,15 @@ def test_a_map_server_file_with_a_png_means_what_its_mode_says(tmp_path, mode, m
     saved = maps.read_map(yaml, saved=True).values[0]
     assert np.isnan(saved[2])
     assert read.T_map_origin[2] == 0.3
+
+
+def test_a_png_is_refused_by_its_size_before_it_is_unpacked(tmp_path):
+    header = b"\x89PNG\r\n\x1a\n\x00\x00\x00\x0dIHDR" + (14000).to_bytes(4, "big") * 2
+    (tmp_path / "map.png").write_bytes(header)
+    yaml = tmp_path / "map.yaml"
+    yaml.write_text(
+        "image: map.png\nresolution: 0.1\norigin: [0, 0, 0]\nnegate: 0\n"
+        "occupied_thresh: 0.6\nfree_thresh: 0.2\n"
+    )
+    with pytest.raises(LogFormatError, match="14000 x 14000 pixels, at most 178956970"):
+        maps.read_map(yaml, saved=True)

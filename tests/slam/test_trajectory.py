@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Trajectories and the TUM files that evo reads."""
+"""Trajectories, the TUM files that evo reads, and the path of reported poses."""
 
 from __future__ import annotations
 
@@ -10,6 +10,7 @@ import pytest
 
 from slam import Trajectory
 from slam.errors import InvalidValueError, LogFormatError
+from slam.path import PosePath
 from slam.trajectory import read_tum, write_tum
 
 UNIX_NS = 1_700_000_000_123_456_789
@@ -93,3 +94,15 @@ def test_trajectories_are_validated():
         wavy().poses[0, 0] = 1.0
     square = Trajectory(stamps_ns=[1, 2, 3], poses=[[0, 0, 0], [3, 4, 0], [3, 4, 2]])
     assert square.length_m() == 5.0
+
+
+def test_a_lost_robot_is_reported_elsewhere_and_its_motion_is_what_loops_correct():
+    path, there = PosePath(), np.array([5.0, 5.0, 1.0])
+    path.add(10, np.array([1.0, 0.0, 0.0]))
+    path.add(20, np.array([2.0, 0.0, 0.0]), reported=there)
+    there[:] = np.nan  # its poses are its own
+    assert path.poses().tolist() == [[1, 0, 0], [2, 0, 0]]
+    assert path.reported().tolist() == [[1, 0, 0], [5, 5, 1]]
+    corrected = path.poses() + np.array([0.0, 1.0, 0.0])
+    path.replace(corrected)
+    assert path.reported().tolist() == path.poses().tolist() == corrected.tolist()

@@ -67,10 +67,10 @@ def test_create_sets_the_numbers_of_a_name(name: str) -> None:
 
 
 def test_the_ekf_takes_numbers_on_top_of_the_preset_that_the_frames_ask_for() -> None:
-    system = slam.create("ekf{lifecycle.lost_after=4}")
+    system = slam.create("ekf{separation_m=0.5}")
     system.update(tour()[0])
     assert system.config.confirm_looks == 8  # type: ignore[attr-defined]
-    assert system.config.lifecycle.lost_after == 4  # type: ignore[attr-defined]
+    assert system.config.separation_m == 0.5  # type: ignore[attr-defined]
 
 
 def test_what_cannot_be_set_is_said() -> None:

@@ -4,7 +4,7 @@
 Each person stays somewhere, walks to the next goal down its flow field (``sim.core.flow``) or
 follows somebody (``sim.actors.people.following``), gives way at doors, and picks a velocity that
 hits nothing soon (``sim.actors.people.avoidance``). A person whose way is blocked by a chair loses
-patience and pushes it; now and then one sits down (``sim.actors.people.sitting``).
+patience and pushes it; now and then one sits down (``sim.actors.people.trips``).
 """
 
 from __future__ import annotations
@@ -17,20 +17,20 @@ import numpy as np
 from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
-from sim.actors.people.avoidance import ACCEL, choose, spare_robot
-from sim.actors.people.carrying import keep_hold, pushes
-from sim.actors.people.cleaning import clean, to_what_is_taken
+from sim.actors.people.avoidance import ACCEL, choose, nearby, sense, spare_robot
+from sim.actors.people.carrying import clean, keep_hold, pushes, to_what_is_taken
 from sim.actors.people.following import (
     faces,
     follow,
     is_pushing,
     make_room,
     make_way,
+    near_place,
     rests,
+    spread_out,
     stand_in_line,
     wait_behind,
 )
-from sim.actors.people.formation import near_place, spread_out
 from sim.actors.people.leaders import Leaders, note_ways
 from sim.actors.people.right_of_way import (
     OPEN,
@@ -44,12 +44,10 @@ from sim.actors.people.right_of_way import (
     round_leaf,
     wait_beside,
 )
-from sim.actors.people.sensing import nearby, sense
-from sim.actors.people.sitting import Hulls, on_chair, to_chair
-from sim.actors.people.trips import patience, plan
+from sim.actors.people.trips import Hulls, on_chair, patience, plan, to_chair
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from sim.core.state import Records
-from slam._jit import njit
+from slam._jit import inner
 
 _W = ACTORS.walking
 _S = ACTORS.steering
@@ -91,7 +89,7 @@ class People(NamedTuple):
     weights: Float
 
 
-@njit
+@inner
 def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, other movers aside."""
     discs, state, task = crowd.discs, crowd.state, crowd.task
@@ -109,7 +107,7 @@ def want(i: int, pace: float, ways: Doors, field: Field, crowd: Crowd) -> tuple[
     return at_doors(i, (wx, wy), ways, field, discs)
 
 
-@njit
+@inner
 def at_doors(
     i: int, wanted: tuple[float, float], ways: Doors, field: Field, discs: Records
 ) -> tuple[float, float]:
@@ -126,7 +124,7 @@ def at_doors(
     return wx, wy
 
 
-@njit
+@inner
 def keep_right(i: int, wx: float, wy: float, field: Field, discs: Records) -> tuple[float, float]:
     """The wanted velocity of one of a stream, which keeps to the right side of a corridor."""
     x, y = discs[i].x, discs[i].y
@@ -139,13 +137,13 @@ def keep_right(i: int, wx: float, wy: float, field: Field, discs: Records) -> tu
     return wx + LANE * speed * rx, wy + LANE * speed * ry
 
 
-@njit
+@inner
 def wrap(angle: float) -> float:
     """The same angle in [-pi, pi)."""
     return angle - 2.0 * math.pi * math.floor((angle + math.pi) / (2.0 * math.pi))
 
 
-@njit
+@inner
 def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -> None:
     """Change towards (vx, vy) as fast as legs allow and face the way; servo targets to ``out``."""
     state, yaw = crowd.state, crowd.yaws[i]
@@ -165,7 +163,7 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -most), most)
 
 
-@njit
+@inner
 def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float]:
     """The velocity person ``i`` would like to have, whatever it does; keeps account of the way."""
     crowd, field = people.crowd, people.field
@@ -200,7 +198,7 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     return wx, wy
 
 
-@njit
+@inner
 def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], people: People) -> None:
     """One tick of all people, from positions to the set points of their servos.
 

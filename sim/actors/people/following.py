@@ -1,8 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """People who accompany a leader, the robot or one of them, and people in a line.
 
-Everybody goes to a place of its own (``sim.actors.people.formation``) and makes way for the robot
-and for those who are held up. Who is held up near the place rests there for a while.
+Everybody has a place in the frame of the leader's course. Two who would cross each other's way take
+each other's place. A place in a wall is drawn in towards the leader, so whoever is there can see
+it; who cannot goes the way the leader went. When the leader stands for a while, the places around
+it step back, which lets it out of a corner. Everybody makes way for the robot and for those who are
+held up. Who is held up near the place rests there for a while.
 """
 
 from __future__ import annotations
@@ -11,23 +14,177 @@ import math
 
 from sim.actors.config import ACTORS
 from sim.actors.people import columns
-from sim.actors.people.formation import in_file, in_sight, near_place, taken, through_door
-from sim.actors.people.leaders import MOVING, Leaders
+from sim.actors.people.leaders import CRUMB, CRUMBS, MOVING, Leaders
 from sim.actors.people.right_of_way import Crowd
-from sim.core.flow import Field, clearance_at, way_at
-from slam._jit import njit
+from sim.core.flow import FAR, Field, clearance_at, time_at, way_at
+from slam._jit import inner
 
 _F = ACTORS.following
+GIVE_WAY_S, STEP_BACK, STEP_BACK_M = _F.give_way_s, _F.step_back, _F.step_back_m
+MARGIN, SIGHT, WIDE = _F.margin_m, _F.sight_m, _F.wide_m
+NARROW, NARROW_SIDE, CROSSING = _F.narrow_m, _F.narrow_side_m, _F.crossing_m2
+STANDS_S, STANDS_M, NEAR_M = _F.stands_s, _F.stands_m, _F.near_m
+BEHIND = -0.5  # m; a place farther behind is one on the leader's way
+
+
+@inner
+def in_sight(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
+    """Whether the straight way between two places is free of walls."""
+    dx, dy = tx - x, ty - y
+    far = math.sqrt(dx * dx + dy * dy)
+    steps = int(far / 0.15) + 1
+    for k in range(1, steps + 1):
+        if clearance_at(field, x + dx * k / steps, y + dy * k / steps) < SIGHT:
+            return False
+    return True
+
+
+@inner
+def through_door(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
+    """Whether the straight way between two places leads through something narrow."""
+    dx, dy = tx - x, ty - y
+    steps = int(math.sqrt(dx * dx + dy * dy) / 0.15)
+    for k in range(steps // 4 + 2, steps - steps // 4 - 1):
+        if clearance_at(field, x + dx * k / steps, y + dy * k / steps) < WIDE:
+            return True
+    return False
+
+
+@inner
+def route(i: int, tx: float, ty: float, field: Field, crowd: Crowd) -> tuple[float, float]:
+    """A place in sight of person ``i`` on the way to (tx, ty): itself, or a step round the walls.
+
+    Round walls one goes the way to the goal that is the nearest to it.
+    """
+    x, y = crowd.discs[i].x, crowd.discs[i].y
+    if in_sight(field, x, y, tx, ty):
+        return tx, ty
+    goal, least = -1, FAR
+    for k in range(field.times.shape[0]):
+        time = time_at(field, k, tx, ty)
+        if time < least:
+            goal, least = k, time
+    if goal < 0:
+        return tx, ty
+    wx, wy = way_at(field, goal, x, y)
+    return x + wx, y + wy
+
+
+@inner
+def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
+    """Where person ``i`` would like to be, in the formation of leader ``k``."""
+    course, disc = leaders.course[k], crowd.discs[leaders.rows[k]]
+    ahead, left = crowd.state[i].ahead, crowd.state[i].left
+    far = math.sqrt(ahead * ahead + left * left)
+    clear = clearance_at(field, disc.x, disc.y)
+    if clear < NARROW:  # those beside it go in file, those ahead keep between the walls
+        room = max(clear - NARROW_SIDE, 0.1)
+        if ahead <= 0.5:
+            ahead = -float(crowd.state[i].file)
+        elif abs(left) > room:
+            ahead += 0.5 * (abs(left) - room)
+            left = room if left > 0.0 else -room
+        far = math.sqrt(ahead * ahead + left * left)
+    if ahead < BEHIND:  # on the way that the leader has come
+        back = min(int(-ahead / CRUMB), int(course.count) - 1)
+        at = (int(course.last) - back) % CRUMBS
+        return float(leaders.trail[k, at, 0]), float(leaders.trail[k, at, 1])
+    back_off = min(max(course.stood - GIVE_WAY_S, 0.0) * STEP_BACK, STEP_BACK_M)
+    far += back_off
+    angle = course.heading + math.atan2(left, ahead)
+    c, s = math.cos(angle), math.sin(angle)
+    x, y, reach = disc.x, disc.y, 0.0
+    while reach + 0.1 <= far:
+        if clearance_at(field, x + (reach + 0.1) * c, y + (reach + 0.1) * s) < MARGIN:
+            break
+        reach += 0.1
+    return x + reach * c, y + reach * s
+
+
+@inner
+def _crossing(a: float, b: float, p: float, q: float) -> float:
+    """By how much (m2) the ways from a to q and b to p are shorter, on one axis."""
+    return (a - p) ** 2 + (b - q) ** 2 - (a - q) ** 2 - (b - p) ** 2
+
+
+@inner
+def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
+    """Where everybody's place is now; pairs who would cross take each other's."""
+    state, task, discs = crowd.state, crowd.task, crowd.discs
+    for i in range(len(task)):
+        if task[i].walking == columns.FOLLOWS:
+            x, y = place_of(i, task[i].leader, field, leaders, crowd)
+            state[i].spot_x, state[i].spot_y = x, y
+    for i in range(len(task)):
+        for j in range(i + 1 if task[i].walking == columns.FOLLOWS else len(task), len(task)):
+            if task[j].walking != columns.FOLLOWS or task[j].leader != task[i].leader:
+                continue
+            one, two = state[i], state[j]
+            gain = _crossing(discs[i].x, discs[j].x, one.spot_x, two.spot_x)
+            gain += _crossing(discs[i].y, discs[j].y, one.spot_y, two.spot_y)
+            if gain > CROSSING:
+                one.ahead, two.ahead = two.ahead, one.ahead
+                one.left, two.left = two.left, one.left
+                one.file, two.file = two.file, one.file
+                one.spot_x, two.spot_x = two.spot_x, one.spot_x
+                one.spot_y, two.spot_y = two.spot_y, one.spot_y
+
+
+@inner
+def in_file(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
+    """Where person ``i`` goes who does not see its place: in file on the way of leader ``k``."""
+    x, y = crowd.discs[i].x, crowd.discs[i].y
+    course, count = leaders.course[k], int(leaders.course[k].count)
+    own = min(int(crowd.state[i].file / CRUMB), count - 1)
+    for step in range(count):  # one's own place, then those behind it, then those before it
+        back = own + step if own + step < count else count - 1 - step
+        at = (int(course.last) - back) % CRUMBS
+        if in_sight(field, x, y, leaders.trail[k, at, 0], leaders.trail[k, at, 1]):
+            return float(leaders.trail[k, at, 0]), float(leaders.trail[k, at, 1])
+    leader = crowd.discs[leaders.rows[k]]
+    return route(i, leader.x, leader.y, field, crowd)
+
+
+@inner
+def near_place(i: int, leaders: Leaders, crowd: Crowd) -> bool:
+    """Whether person ``i`` is as good as at its place, or with its leader.
+
+    Farther off will do while the leader stands.
+    """
+    k = crowd.task[i].leader
+    reach = STANDS_M if leaders.course[k].stood > STANDS_S else NEAR_M
+    leader = crowd.discs[leaders.rows[k]]
+    lx = leader.x - crowd.discs[i].x
+    ly = leader.y - crowd.discs[i].y
+    if lx * lx + ly * ly < reach * reach:
+        return True
+    dx = crowd.state[i].spot_x - crowd.discs[i].x
+    dy = crowd.state[i].spot_y - crowd.discs[i].y
+    return bool(dx * dx + dy * dy < reach * reach)
+
+
+@inner
+def taken(i: int, x: float, y: float, crowd: Crowd) -> bool:
+    """Whether something else stands at a place, so that person ``i`` cannot."""
+    discs = crowd.discs
+    for k in range(len(discs)):
+        dx, dy = discs[k].x - x, discs[k].y - y
+        reach = discs[k].r + discs[i].r
+        if k != i and dx * dx + dy * dy < reach * reach:
+            return True
+    return False
+
+
 FASTEST, THERE, SERVED_S, GAIN = _F.fastest_mps, _F.there_m, _F.served_s, _F.gain
-NARROW, WAY_M, WAY_HALF, ASIDE = _F.narrow_m, _F.way_m, _F.way_half_m, _F.aside_mps
-TAKEN_M, ASKED_S, STANDS_S = _F.taken_m, _F.asked_s, _F.stands_s
+WAY_M, WAY_HALF, ASIDE = _F.way_m, _F.way_half_m, _F.aside_mps
+TAKEN_M, ASKED_S = _F.taken_m, _F.asked_s
 ROOM_M, ROOM_PUSH_M, ROOM_HALF = _F.room_m, _F.room_push_m, _F.room_half_m
 FILE_M, FILE_GAP, FILE_HALF = _F.file_m, _F.file_gap_m, _F.file_half
 TURN_MOST = ACTORS.walking.turn_most
 HELD_UP_S, REST_S = _F.held_up_s, _F.rest_s
 
 
-@njit
+@inner
 def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` would like to keep its place."""
     k = crowd.task[i].leader
@@ -45,13 +202,13 @@ def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float,
     return to_place(tx - x, ty - y, u, v)
 
 
-@njit
+@inner
 def share_of(far: float) -> float:
     """Of the leader's velocity: who is far behind goes straight to the place."""
     return max(1.0 - far, 0.0)
 
 
-@njit
+@inner
 def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
     """Velocity to a place (dx, dy) m away that itself moves at (u, v)."""
     far = math.sqrt(dx * dx + dy * dy)
@@ -64,7 +221,7 @@ def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
     return wx / over + 0.0, wy / over + 0.0
 
 
-@njit
+@inner
 def wait_behind(
     i: int, wanted: tuple[float, float], field: Field, leaders: Leaders, crowd: Crowd
 ) -> tuple[float, float]:
@@ -96,7 +253,7 @@ def wait_behind(
     return most * c, most * s
 
 
-@njit
+@inner
 def make_way(
     i: int, wanted: tuple[float, float], field: Field, leaders: Leaders, crowd: Crowd
 ) -> tuple[float, float]:
@@ -120,13 +277,13 @@ def make_way(
     return along * c - side * ASIDE * s, along * s + side * ASIDE * c
 
 
-@njit
+@inner
 def is_pushing(i: int, crowd: Crowd) -> bool:
     """Whether person ``i`` has something long before it, and not lost it since."""
     return bool(crowd.task[i].held >= 0 and crowd.state[i].turn_rate < TURN_MOST)
 
 
-@njit
+@inner
 def make_room(
     i: int, wanted: tuple[float, float], field: Field, crowd: Crowd
 ) -> tuple[float, float]:
@@ -150,7 +307,7 @@ def make_room(
     return wanted
 
 
-@njit
+@inner
 def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     """Whether person ``i`` was held up near its place and lets it be for a while."""
     state = crowd.state[i]
@@ -162,7 +319,7 @@ def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     return False
 
 
-@njit
+@inner
 def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """Velocity to one's place in the line, which moves up by one every ``SERVED_S``."""
     place = crowd.task[i].place
@@ -174,7 +331,7 @@ def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[
     return to_place(dx, dy, 0.0, 0.0)
 
 
-@njit
+@inner
 def faces(i: int, leaders: Leaders, crowd: Crowd) -> float:
     """Heading rad of someone who stands: towards the leader, or up the line."""
     k = crowd.task[i].leader

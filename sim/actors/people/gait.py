@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -32,7 +32,7 @@ SEAT_HEIGHT, KNEES = 0.52, 0.42  # m, hips of who sits, and how far ahead of the
 SWING_SHARE = 0.80  # of a step; the rest is double support
 
 
-@njit
+@inner
 def step_time(speed: float) -> float:
     """Duration of one step, s: cadence 1.8 steps/s at 1 m/s, 2.2 at 1.3 m/s."""
     return min(max(0.80 - 0.26 * speed, 0.34), 0.75)
@@ -45,13 +45,13 @@ def rest_foot(x: float, y: float, yaw: float, foot: int) -> tuple[float, float]:
     return x - side * math.sin(yaw), y + side * math.cos(yaw)
 
 
-@njit
+@inner
 def swung(phase: float) -> float:
     """Share of the way a swinging foot has made: peak speed 1.3 times its mean."""
     return 0.4 * phase + 0.6 * phase * phase * (3.0 - 2.0 * phase)
 
 
-@njit
+@inner
 def pick_foot(p: Float, pose: tuple[float, float, float], vx: float, vy: float) -> int:
     """The foot to lift now, -1: none. Walking: in turns; standing: one that is out of place."""
     x, y, yaw = pose
@@ -70,7 +70,7 @@ def pick_foot(p: Float, pose: tuple[float, float, float], vx: float, vy: float) 
     return worst if away[worst] > 0.07 else -1
 
 
-@njit
+@inner
 def step_feet(p: Float, pose: tuple[float, float, float], vx: float, vy: float, dt: float) -> None:
     """Advance the feet of one person by ``dt`` s under a body at ``pose`` moving at (vx, vy)."""
     x, y, yaw = pose
@@ -99,7 +99,7 @@ def step_feet(p: Float, pose: tuple[float, float, float], vx: float, vy: float, 
         p[PAUSE] = (1.0 - SWING_SHARE) * duration
 
 
-@njit
+@inner
 def quaternion(yaw: float, ax: float, ay: float, az: float, out: Float) -> None:
     """Orientation whose z axis is (ax, ay, az) in the heading frame and whose x looks ahead."""
     pitch, roll = 0.5 * math.atan2(ax, az), -0.5 * math.asin(min(max(ay, -1.0), 1.0))
@@ -110,7 +110,7 @@ def quaternion(yaw: float, ax: float, ay: float, az: float, out: Float) -> None:
     out[1], out[2] = cy * i - sy * j, cy * j + sy * i
 
 
-@njit
+@inner
 def pose_leg(
     hip: tuple[float, float, float],
     yaw: float,

@@ -17,7 +17,7 @@ from sim.actors.config import ACTORS
 from sim.actors.people import columns
 from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.state import Records, flat
-from slam._jit import njit
+from slam._jit import inner
 
 _F = ACTORS.following
 CRUMB, COURSE_RATE, MOVING = _F.crumb_m, _F.course_rate, _F.moving_mps
@@ -56,7 +56,7 @@ def arrays(leaders: Leaders) -> dict[str, NDArray[np.generic]]:
     return {"trail": leaders.trail, "course": course, "lines": lines}
 
 
-@njit
+@inner
 def note_ways(tick: float, leaders: Leaders, crowd: Crowd) -> None:
     """Remember where every leader is, and turn its formation after it."""
     for k in range(len(leaders.rows)):

@@ -16,7 +16,7 @@ from scenes.scene import Role, Scene
 from sim.actors import holding
 from sim.actors.config import ACTORS
 from sim.actors.doors import Doors
-from sim.actors.people import columns, crowd, gait, right_of_way, sitting
+from sim.actors.people import columns, crowd, gait, right_of_way, trips
 from sim.actors.people.leaders import Leaders, arrays, leaders_of
 from sim.actors.people.right_of_way import Addresses, Crowd
 from sim.core.bodies import Bodies
@@ -57,14 +57,14 @@ def floor_field(scene: Scene, leaves: Float) -> Field:
     return _flow(bounds, boxes.tobytes(), leaves.tobytes(), goals.tobytes()).field
 
 
-def _hulls(model: mujoco.MjModel, names: Sequence[str]) -> sitting.Hulls:
+def _hulls(model: mujoco.MjModel, names: Sequence[str]) -> trips.Hulls:
     geoms = np.array([model.geom(f"{name}/hull").id for name in names], dtype=np.int64)
     body = mujoco.mjtObj.mjOBJ_BODY
     looks = np.array([mujoco.mj_name2id(model, body, f"{p}/look") for p in names], dtype=np.int64)
     bits = np.column_stack([model.geom_contype[geoms], model.geom_conaffinity[geoms]])
     heights = model.body_pos[looks, 2].copy()
     own = (model.geom_contype, model.geom_conaffinity, model.body_pos)
-    return sitting.Hulls(geoms, bits, looks, heights, *own)
+    return trips.Hulls(geoms, bits, looks, heights, *own)
 
 
 class People:
@@ -178,7 +178,7 @@ class People:
 
     def dress(self) -> None:
         """Let the model follow who sits: hulls that meet no chair, torsos lowered."""
-        sitting.dress(self.crowd, self.table.hulls)
+        trips.dress(self.crowd, self.table.hulls)
 
     def stand(self, data: mujoco.MjData) -> None:
         """Put everybody's feet under them where ``data`` says they are."""

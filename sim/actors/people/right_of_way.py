@@ -16,7 +16,7 @@ from sim.actors.config import ACTORS
 from sim.actors.people import columns
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from sim.core.state import Record, Records
-from slam._jit import njit
+from slam._jit import inner
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -73,7 +73,7 @@ class Addresses(NamedTuple):
     hinges: Float
 
 
-@njit
+@inner
 def wants_through(i: int, door: Record, field: Field, crowd: Crowd) -> int:
     """Side (+1 where the leaf swings to, -1) from which person ``i`` wants to pass; 0: none."""
     discs, task = crowd.discs, crowd.task
@@ -92,7 +92,7 @@ def wants_through(i: int, door: Record, field: Field, crowd: Crowd) -> int:
     return 1 if normal > 0.0 else -1
 
 
-@njit
+@inner
 def follows_through(i: int, door: Record, crowd: Crowd) -> int:
     """The same of person ``i`` who follows somebody, by the next place on its way."""
     dx, dy = crowd.discs[i].x - door.cx, crowd.discs[i].y - door.cy
@@ -111,7 +111,7 @@ def follows_through(i: int, door: Record, crowd: Crowd) -> int:
     return 1 if here > 0.0 else -1
 
 
-@njit
+@inner
 def give_turns(  # noqa: C901, PLR0912 (kernel)
     ways: Doors, field: Field, crowd: Crowd
 ) -> None:
@@ -162,7 +162,7 @@ def give_turns(  # noqa: C901, PLR0912 (kernel)
         passage[d].asked = 1.0 if asked else 0.0
 
 
-@njit
+@inner
 def wait_beside(
     i: int, door: Record, side: int, field: Field, discs: Records
 ) -> tuple[float, float]:
@@ -181,7 +181,7 @@ def wait_beside(
     return speed * tx, speed * ty
 
 
-@njit
+@inner
 def hold_off(
     i: int, d: int, wanted: tuple[float, float], ways: Doors, discs: Records
 ) -> tuple[float, float]:
@@ -213,7 +213,7 @@ def hold_off(
     return wanted[0] + excess * rx, wanted[1] + excess * ry
 
 
-@njit
+@inner
 def round_leaf(
     i: int, wanted: tuple[float, float], ways: Doors, discs: Records
 ) -> tuple[float, float]:

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
@@ -30,7 +30,7 @@ UNSEEN_GROUPS = (HULL_GROUP, PAINT_GROUP)
 def candidates(
     model: mujoco.MjModel, height: float, reach: float, robot: str | None, panes: Bool
 ) -> tuple[NDArray[np.int64], Float]:
-    """(n,) ids and (n, 8) table of what a scanner can see.
+    """(n,) ids and (n, 7) table of what a scanner can see.
 
     height  m, of the scan plane; ``reach`` m, how far rays may leave it
     robot   name of the scanner's own body; it and its children are not seen
@@ -57,7 +57,7 @@ def candidates(
             f"cylinder, box or plane): put it in group {HULL_GROUP} and add primitives for the "
             "laser to see"
         )
-    columns = (kind, *model.geom_size.T, half, upright, panes, body)
+    columns = (kind, *model.geom_size.T, half, upright, panes)
     table = np.column_stack(columns).astype(np.float64)[seen]
     return np.flatnonzero(seen).astype(np.int64), np.ascontiguousarray(table)
 
@@ -103,7 +103,7 @@ def _changes_height(model: mujoco.MjModel, data: mujoco.MjData) -> Bool:
     return np.array(out, dtype=np.bool_)
 
 
-@njit
+@inner
 def _half_height(kind: int, size: Float, mat: Float) -> float:
     """Half the vertical extent of a primitive with the given orientation, m."""
     x, y, z = abs(mat[6]), abs(mat[7]), abs(mat[8])  # world z of the geom's own axes

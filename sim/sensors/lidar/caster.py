@@ -18,7 +18,9 @@ from sim.sensors.lidar.scanner import Spot
 
 Float = NDArray[np.float64]
 Hits = tuple[Float, NDArray[np.int64], Float]
-Noted = tuple[Float, Float]  # (m, 12) poses of what can move, (3,) x, y, yaw of the laser
+# (m, 12) poses of what can move; (3,) x, y, yaw of the laser; (bodies, 7) the bodies' places, NaN
+# for those that moved or are not known.
+Noted = tuple[Float, Float, Float]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -92,9 +94,14 @@ class Raycaster:
         self.poses = np.zeros((slots, n, col.N_POSE))
         self.bounds = np.zeros((n, col.N_BOUND))
         self.lasers = np.zeros((slots, 3))
-        self._all = np.arange(n)
-        self._movable = np.flatnonzero(
-            np.isin(model.geom_bodyid[self.ids], np.flatnonzero(model.body_weldid != 0))
+        bodies, first, count = np.unique(
+            model.geom_bodyid[self.ids], return_index=True, return_counts=True
+        )  # ids ascend, and so do their bodies
+        moves = np.full(bodies.size, col.MOVES)
+        self._all = np.column_stack((bodies, first, first + count, moves)).astype(np.int64)
+        self._runs = self._all[model.body_weldid[bodies] != 0]
+        self._movable = np.concatenate(
+            [np.arange(a, b) for _, a, b, _ in self._runs.tolist()] or [np.arange(0)]
         )
         self._site = site
         self._filled = np.zeros(1, dtype=np.int64)
@@ -114,25 +121,41 @@ class Raycaster:
         self._filled[0] = 0
         if data is not self._seen:
             self._seen = data
-            views = (data.geom_xpos, data.geom_xmat, data.site_xpos, data.site_xmat)
-            where = (*views, self._site, self.poses, self.lasers, self._filled)
-            windows.note((self.ids, self._all, *where))
-            self.poses[1:] = self.poses[0]  # what cannot move is never noted again
+            where = (
+                data.xpos, data.xquat, data.geom_xpos, data.geom_xmat, data.site_xpos,
+                data.site_xmat, self._site, self.poses, self.lasers, self._filled,
+            )  # fmt: skip
+            self._all[:, col.RUN_STATE] = self._runs[:, col.RUN_STATE] = col.MOVES
+            windows.note((self.ids, self._all, np.zeros((len(self._all), 7)), *where))
             windows.enclose(self.table, self._all, self.poses, 1, self.bounds)
-            self.noted = (self.ids, self._movable, *where)
+            self._places = np.zeros((len(self._runs), 7))
+            self.noted = (self.ids, self._runs, self._places, *where)
             self._filled[0] = 0
         if before is not None:
-            self.poses[0, self._movable], self.lasers[0] = before
+            self.poses[0, self._movable], self.lasers[0], self._places[:] = before
+            self._runs[:, col.RUN_STATE] = col.PLACED
             self._filled[0] = 1
         self.note()
 
     def last_notes(self) -> tuple[Noted, Noted]:
         """The two last notes of the scan, the older one first."""
         last = int(self._filled[0]) - 1
+        moved = self._runs[:, col.RUN_STATE] == col.MOVES
+        places = np.where(moved[:, np.newaxis], np.nan, self._places)
         older, newer = (
-            (self.poses[slot][self._movable], self.lasers[slot].copy()) for slot in (last - 1, last)
+            (self._poses_at(slot), self.lasers[slot].copy(), places) for slot in (last - 1, last)
         )
         return older, newer
+
+    def _poses_at(self, slot: int) -> Float:
+        """(m, 12) of what can move."""
+        moved = np.repeat(
+            self._runs[:, col.RUN_STATE] == col.MOVES,
+            self._runs[:, col.RUN_END] - self._runs[:, col.RUN_FIRST],
+        )
+        poses: Float = self.poses[0, self._movable]
+        poses[moved] = self.poses[slot, self._movable[moved]]
+        return poses
 
     def settle(self, expected: Noted) -> bool:
         """What was moved by hand since the first of two notes is taken to have stood there then.
@@ -140,8 +163,9 @@ class Raycaster:
         expected  what the second note would be otherwise
         Returns whether the laser is where it was expected.
         """
-        moved = self._movable[(self.poses[1, self._movable] != expected[0]).any(axis=1)]
-        self.poses[0, moved] = self.poses[1, moved]
+        now = self._poses_at(1)
+        moved = (now != expected[0]).any(axis=1)
+        self.poses[0, self._movable[moved]] = now[moved]
         stands = bool(np.array_equal(self.lasers[1], expected[1]))
         if not stands:
             self.lasers[0] = self.lasers[1]
@@ -150,7 +174,8 @@ class Raycaster:
     @property
     def movable_ids(self) -> NDArray[np.int64]:
         """(m,) ids of the geoms that ``last_notes`` is of."""
-        return self.ids[self._movable]
+        ids: NDArray[np.int64] = self.ids[self._movable]
+        return ids
 
     def note(self) -> None:
         """Note where everything is now, in the next slot."""
@@ -161,7 +186,7 @@ class Raycaster:
         if plan is not self._plan:
             self._prepare(plan)
         raycast.sweep(
-            self.table, self._movable, self.poses, self.lasers, int(self._filled[0]), self.bounds,
+            self.table, self._runs, self.poses, self.lasers, int(self._filled[0]), self.bounds,
             plan.rows, plan.ends, plan.beams, self._rays, self._optics, self._work, self.hits,
         )  # fmt: skip
 

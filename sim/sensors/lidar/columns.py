@@ -6,15 +6,20 @@ Imported as a module: ``fan[i, col.AZIMUTH]``.
 
 from __future__ import annotations
 
-# A geom, (n, 8): mjtGeom, size, half its height, whether it is a box that stands upright for good;
+# A geom, (n, 7): mjtGeom, size, half its height, whether it is a box that stands upright for good;
 # the layer, 0 for the room, 1 for panes that a beam may pass.
-KIND, SIZE_X, SIZE_Y, SIZE_Z, HALF_HEIGHT, UPRIGHT, LAYER, BODY = range(8)
+KIND, SIZE_X, SIZE_Y, SIZE_Z, HALF_HEIGHT, UPRIGHT, LAYER = range(7)
 PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX = 0, 2, 3, 4, 5, 6  # values of KIND
 PRIMITIVES = (PLANE, SPHERE, CAPSULE, ELLIPSOID, CYLINDER, BOX)
 
 # A pose, (slots, n, 12) and in tuples: position, then matrix by rows.
 PX, PY, PZ, R00, R01, R02, R10, R11, R12, R20, R21, R22 = range(12)
 N_POSE = 12
+
+# The geoms of one body, (bodies, 4): its id, their first row and the row after their last; and
+# whether it rests where its bounds are of, was placed anew before the scan, or moves in it.
+RUN_BODY, RUN_FIRST, RUN_END, RUN_STATE = range(4)
+RESTS, PLACED, MOVES = range(3)  # values of RUN_STATE
 
 # Where the laser was, (slots, 3).
 LASER_X, LASER_Y, LASER_YAW = range(3)

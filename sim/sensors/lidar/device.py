@@ -17,7 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.sensors.lidar.caster import Raycaster
+from sim.sensors.lidar.caster import Noted, Raycaster
 from sim.sensors.lidar.receiver import ScanResult, SignalModel
 from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.sensors.lidar.schedule import Window, most_notes, schedule
@@ -95,8 +95,8 @@ class LaserScanner:
         self.phase = Fraction(0)
         self.window: Window = self._windows(self.phase)
         # Of the scan before, where the next begins within its last step: the notes of that step.
-        self._before: tuple[Float, Float] | None = None
-        self._after: tuple[Float, Float] | None = None
+        self._before: Noted | None = None
+        self._after: Noted | None = None
         self.carried = False
 
     @property
@@ -159,7 +159,7 @@ class LaserScanner:
         """
         if self._before is None:
             return {}, {}
-        poses, laser = self._before
+        poses, laser, _ = self._before
         arrays = {"geoms": self.caster.movable_ids, "geom_poses": poses, "laser": laser}
         return arrays, {"phase": [self.phase.numerator, self.phase.denominator]}
 
@@ -179,7 +179,7 @@ class LaserScanner:
             raise InvalidValueError("the state is of another scanner, or of another world")
         rows = [known[geom] for geom in wanted]
         self.phase, self.window = phase, self._windows(phase)
-        self._before = (arrays["geom_poses"][rows], arrays["laser"].copy())
+        self._before = (arrays["geom_poses"][rows], arrays["laser"].copy(), np.array(np.nan))
 
 
 def _check_timestep(model: mujoco.MjModel) -> None:

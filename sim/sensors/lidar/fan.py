@@ -14,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
-from slam._jit import njit
+from slam._jit import inner
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -23,12 +23,12 @@ Vec3 = tuple[float, float, float]
 SLACK = 5e-5  # rad and m by which bounds are widened: above what ``_azimuth`` and rounding miss
 
 
-@njit
+@inner
 def _wrapped(angle: float) -> float:
     return angle - math.tau * math.floor(angle / math.tau + 0.5)
 
 
-@njit
+@inner
 def _turned_by(delta: float) -> tuple[float, float]:
     """(cos, sin) of what a robot turns in a step: series to 1e-17 below 0.03 rad."""
     if abs(delta) > 0.03:
@@ -40,7 +40,7 @@ def _turned_by(delta: float) -> tuple[float, float]:
     )
 
 
-@njit
+@inner
 def lay_fans(plan: Float, lasers: Float, ends: Int, fan: Float, frames: Float) -> None:
     """Fill the (m, 7) table of the beams in the world, and the (fans, 4) frames of the fans.
 
@@ -81,7 +81,7 @@ def lay_fans(plan: Float, lasers: Float, ends: Int, fan: Float, frames: Float) -
         frames[f, col.PER_RADIAN], frames[f, col.UNEVEN] = 1.0 / step, uneven + SLACK
 
 
-@njit
+@inner
 def ray_wedge(frames: Float, slope: float) -> tuple[float, float]:
     """(lowest, highest) azimuth of any ray of the scan."""
     low, high = math.inf, -math.inf

@@ -24,7 +24,7 @@ import numpy as np
 from sim.sensors.lidar.models.lms221 import TURNS_PER_S, Lms221Config
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Frame, LaserSpec, Scan
-from slam.frontend.odometry_sum import MotionSum
+from slam.frontend.odometry_steps import MotionSum
 
 BITS_PER_BYTE = 10  # TL 4.1
 BYTES_PER_TURN = 508  # TL p22, at 500 kBd

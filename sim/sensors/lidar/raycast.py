@@ -16,13 +16,13 @@ from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, lay_fans, ray_wedge
 from sim.sensors.lidar.ray_shapes import Pose, face_normal, meet
 from sim.sensors.lidar.windows import enclose, find_windows, nearest_first
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Ray = tuple[Vec3, Vec3]
 AWAY = 1e-6  # m from a mirror at which what it shows begins, so that it does not show itself
 
 
-@njit
+@inner
 def _pose(poses: Float, slot: int, j: int) -> Pose:
     """Pose of geom j in a slot."""
     return (
@@ -32,12 +32,12 @@ def _pose(poses: Float, slot: int, j: int) -> Pose:
     )  # fmt: skip
 
 
-@njit
+@inner
 def _size(table: Float, j: int) -> Vec3:
     return table[j, col.SIZE_X], table[j, col.SIZE_Y], table[j, col.SIZE_Z]
 
 
-@njit
+@inner
 def _between(a: Pose, b: Pose, t: float) -> Pose:
     """Pose on the way from a to b, ``t`` 0..1.
 
@@ -52,7 +52,15 @@ def _between(a: Pose, b: Pose, t: float) -> Pose:
     )  # fmt: skip
 
 
-@njit
+@inner
+def _pose_at(poses: Float, bounds: Float, j: int, slot: int, part: float) -> Pose:
+    """Pose of geom j a ``part`` of the way from one slot to the next."""
+    if bounds[j, col.MOVED] == 0.0:
+        return _pose(poses, 0, j)
+    return _between(_pose(poses, slot, j), _pose(poses, slot + 1, j), part)
+
+
+@inner
 def _ray(c: float, s: float, x: float, y: float, z: float, lever: Vec3, way: Vec3) -> Ray:  # noqa: PLR0913 (kernel)
     """Origin and unit direction in the world of a ray of the beam that leaves (x, y, z).
 
@@ -63,7 +71,7 @@ def _ray(c: float, s: float, x: float, y: float, z: float, lever: Vec3, way: Vec
     return origin, (c * way[0] - s * way[1], s * way[0] + c * way[1], way[2])
 
 
-@njit
+@inner
 def _cast_windows(  # noqa: PLR0913, PLR0915 (kernel)
     table: Float,
     poses: Float,
@@ -142,7 +150,7 @@ def _cast_windows(  # noqa: PLR0913, PLR0915 (kernel)
 @njit
 def sweep(  # noqa: PLR0913 (kernel)
     table: Float,
-    movable: Int,
+    runs: Int,
     poses: Float,
     lasers: Float,
     slots: int,
@@ -157,7 +165,7 @@ def sweep(  # noqa: PLR0913 (kernel)
 ) -> None:
     """Cast the beams of one scan.
 
-    table    the candidate geoms; rows ``movable`` of them can move
+    table    the candidate geoms; ``runs`` of them can move
     poses    of them at the ``slots`` ends of physics steps, and of the laser
     bounds   as ``enclose`` left them for what cannot move
     plan     of the beams, fan k in the rows ``ends[k]`` to ``ends[k + 1]``
@@ -175,7 +183,7 @@ def sweep(  # noqa: PLR0913 (kernel)
     hits[:] = -1
     cosines[:] = math.nan
     farthest[:] = math.inf
-    enclose(table, movable, poses, slots, bounds)
+    enclose(table, runs, poses, slots, bounds)
     lay_fans(plan, lasers, ends, fan, frames)
     wedge = ray_wedge(frames, optics[2])
     found = find_windows(table, poses, bounds, fan, wedge, optics, windows, owners)
@@ -183,7 +191,7 @@ def sweep(  # noqa: PLR0913 (kernel)
     _cast_windows(table, poses, bounds, ends, beams, rays, optics, work, found, out)
 
 
-@njit
+@inner
 def cast_one(  # noqa: PLR0913 (kernel)
     table: Float, poses: Float, bounds: Float, fan: Float, i: int, origin: Vec3, vec: Vec3
 ) -> tuple[float, int, float]:
@@ -201,9 +209,7 @@ def cast_one(  # noqa: PLR0913 (kernel)
             continue
         if table[j, col.LAYER] > 0.0:
             continue
-        pose = _pose(poses, slot, j)
-        if bounds[j, col.MOVED] != 0.0:
-            pose = _between(pose, _pose(poses, slot + 1, j), part)
+        pose = _pose_at(poses, bounds, j, slot, part)
         size = _size(table, j)
         x, cos = meet(int(table[j, col.KIND]), size, pose, origin, vec, best)
         if 0.0 <= x < best:
@@ -240,8 +246,7 @@ def reflect(  # noqa: PLR0913 (kernel)
         j, x = found[layer, beam, 0], ranges[layer, beam, 0]
         if j < 0 or int(table[j, col.KIND]) != col.BOX or (layer == 0 and not polished[j]):
             continue
-        slot = int(fan[i, col.SLOT])
-        pose = _between(_pose(poses, slot, j), _pose(poses, slot + 1, j), fan[i, col.PART])
+        pose = _pose_at(poses, bounds, j, int(fan[i, col.SLOT]), fan[i, col.PART])
         size = _size(table, j)
         vec = (fan[i, col.COS], fan[i, col.SIN], 0.0)
         at = (fan[i, col.ORIGIN_X] + x * vec[0], fan[i, col.ORIGIN_Y] + x * vec[1], height)

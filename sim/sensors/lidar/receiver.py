@@ -20,9 +20,7 @@ from sim.sensors.lidar.signal import (
     Bool,
     Float,
     Int,
-    measure,
-    receive,
-    send,
+    scan,
 )
 from slam._jit import njit
 
@@ -89,14 +87,13 @@ class SignalModel:
         seeds = rng.integers(0, 2**63, size=4)
         unit_of_run, *rest = (np.random.default_rng(seed) for seed in seeds)
         self.streams = tuple(rest)  # noise, mixed pixels, lost values
-        self._weights = np.array(scanner.spot.weights)
-        self._surface = (np.append(surface[0], 0.0), np.append(surface[1], False))
-        self._owner = np.stack([np.append(ids, -1) for ids in surface[2:]])
-        self._needed = needed_table(scanner.needed) if scanner.needed else np.zeros(1)
-        self._error: tuple[Float, float] = (np.zeros(0), 0.0)
+        owner = np.stack([np.append(ids, -1) for ids in surface[2:]])
+        self._surface = (np.append(surface[0], 0.0), np.append(surface[1], False), owner)
+        needed = needed_table(scanner.needed) if scanner.needed else np.zeros(1)
+        error: tuple[Float, float] = (np.zeros(0), 0.0)
         if scanner.systematic:
-            self._error = error_function(scanner.systematic, unit_of_run)
-        self._ruler = len(scanner.spot.weights) == 1 and not (
+            error = error_function(scanner.systematic, unit_of_run)
+        ruler = len(scanner.spot.weights) == 1 and not (
             scanner.needed
             or scanner.incidence
             or scanner.mixed_pixels
@@ -104,31 +101,24 @@ class SignalModel:
             or scanner.bounce
         )
         pulse = scanner.pulse_m if scanner.mixed_pixels else 0.0
-        self._switches = (bool(scanner.needed), scanner.incidence, pulse)
-        self._steps = (
-            scanner.counter_m, scanner.unit_m, scanner.range_min_m, scanner.range_max_m,
-        )  # fmt: skip
-        self._bands = analog_noise(scanner)
+        switches = (bool(scanner.needed), scanner.incidence, pulse)
+        self._receiver = (ruler, np.array(scanner.spot.weights), switches, needed)
+        steps = (scanner.counter_m, scanner.unit_m, scanner.range_min_m, scanner.range_max_m)
+        self._sender = (error, steps, analog_noise(scanner))
         none = math.nan if scanner.error_codes else math.inf
         self._errors = (scanner.dropout_rate, none)
+        # Which of the streams are drawn from.
+        self._drawn = (not ruler and pulse > 0.0, len(self._sender[2]) > 0, self._errors[0] > 0.0)
         self._nothing = np.zeros(0)
 
     def scan(self, hits: Hits, mirrored: tuple[Float, Int, Float]) -> ScanResult:
         """One scan from the caster's ``hits`` and what was mirrored, (n,) or (0,) each."""
         n = hits[0].shape[1]
         places, seen, marks = np.empty((3, n)), np.empty(n, np.int64), np.empty((2, n), np.bool_)
-        chances, normal, lost = self._draws(n)
-        if self._ruler:
-            measure(hits, (places, seen, marks))
-        else:
-            receive(
-                hits, mirrored, self._surface, self._weights, self._switches, self._needed,
-                chances, (places, seen, marks),
-            )  # fmt: skip
         ranges, whose = np.empty(n, dtype=np.float32), np.empty((2, n), dtype=np.int32)
-        send(
-            (places, seen), self._surface[0], self._owner, self._error, (normal, lost),
-            self._steps, self._bands, self._errors, (ranges, whose),
+        scan(
+            hits, mirrored, self._surface, self._receiver, self._sender, self._errors,
+            self._draws(n), (places, seen, marks), (ranges, whose),
         )  # fmt: skip
         return ScanResult(
             ranges=ranges, true_ranges=places[col.MIDDLE], cosines=places[col.COSINE],
@@ -143,11 +133,11 @@ class SignalModel:
     def _draws(self, n: int) -> tuple[Float, Float, Float]:
         """Chances of mixed pixels, normal noise and chances of a loss, of ``n`` beams each."""
         noise, mixed, lost = self.streams
-        with_mixed = not self._ruler and self._switches[2] > 0.0
+        with_mixed, with_noise, with_losses = self._drawn
         return (
             mixed.random((n,)) if with_mixed else self._nothing,
-            noise.standard_normal((n,)) if len(self._bands) else self._nothing,
-            lost.random((n,)) if self._errors[0] > 0.0 else self._nothing,
+            noise.standard_normal((n,)) if with_noise else self._nothing,
+            lost.random((n,)) if with_losses else self._nothing,
         )
 
 

@@ -20,7 +20,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -36,14 +36,14 @@ POLISHED_SHARE = 0.9  # share that a polished face mirrors; inferred
 POLISHED_DIFFUSE = 0.005  # what is left of its reflectivity away from its normal; inferred
 
 
-@njit
+@inner
 def _pane_share(cos: float) -> float:
     """Share of the energy that a pane mirrors."""
     u = 1.0 - min(cos, 1.0)
     return GLASS_AT_NORMAL + (1.0 - GLASS_AT_NORMAL) * u * u * u * u * u
 
 
-@njit
+@inner
 def _sort_rays(distances: Float, order: Int, count: int) -> None:
     for i in range(count):
         order[i] = i
@@ -55,7 +55,7 @@ def _sort_rays(distances: Float, order: Int, count: int) -> None:
         order[j] = k
 
 
-@njit
+@inner
 def _next_pulse(
     distances: Float, energies: Float, surfaces: Int, order: Int, first: int
 ) -> tuple[int, float, float, int]:
@@ -79,7 +79,7 @@ def _next_pulse(
     return row, energy, moment / energy if energy > 0.0 else distances[strongest], strongest
 
 
-@njit
+@inner
 def detect(  # noqa: PLR0913 (kernel)
     distances: Float,
     energies: Float,
@@ -111,17 +111,7 @@ def detect(  # noqa: PLR0913 (kernel)
     return math.inf, -1, False
 
 
-@njit
-def _single(distances: Float, surfaces: Int) -> bool:
-    """Whether all rays are surely one pulse, so that no order is needed; most beams are."""
-    low, high, alike = distances[0], distances[0], True
-    for k in range(1, distances.size):
-        low, high = min(low, distances[k]), max(high, distances[k])
-        alike = alike and surfaces[k] == surfaces[0]
-    return bool(high - low <= (SAME_SURFACE if alike else SAME_PULSE))
-
-
-@njit
+@inner
 def receive(  # noqa: PLR0913, PLR0915 (kernel)
     hits: tuple[Float, Int, Float],
     mirrored: tuple[Float, Int, Float],
@@ -154,6 +144,7 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
     surfaces, order = np.empty(count, dtype=np.int64), np.empty(count, dtype=np.int64)
     for i in range(ranges.shape[1]):
         share, total, moment, strongest, rays = 0.0, 0.0, 0.0, 0, k_rays
+        low, high, alike = math.inf, -math.inf, True
         for k in range(k_rays):
             x, j, cos, through = ranges[0, i, k], found[0, i, k], cos_of[0, i, k], 1.0
             back = reflectivity[j] if by_reflectivity else 1.0
@@ -170,6 +161,7 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
                 back *= POLISHED_DIFFUSE
             energy = weights[k] * through * back * (cos if by_incidence else 1.0)
             distances[k], surfaces[k], cosines[k], energies[k] = x, j, cos, energy
+            low, high, alike = min(low, x), max(high, x), alike and j == surfaces[0]
             total, moment = total + energy, moment + energy * x
             strongest = k if energy > energies[strongest] else strongest
         if bounces and share > 0.0 and mirrored[1][i] >= 0:
@@ -179,7 +171,8 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
             energies[k_rays] = share * share * back * (cos if by_incidence else 1.0)
             rays += 1
         place, ray, mixed = math.inf, -1, False
-        if rays == k_rays and _single(distances[:rays], surfaces[:rays]):
+        if rays == k_rays and high - low <= (SAME_SURFACE if alike else SAME_PULSE):
+            # Surely one pulse, so that no order is needed; most beams are.
             middle = moment / total if total > 0.0 else math.inf
             if total > 0.0 and total >= needed[min(int(middle / NEEDED_STEP), needed.size - 1)]:
                 place, ray = middle, strongest
@@ -194,7 +187,7 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
         marks[col.MIXED, i], marks[col.GHOST, i] = mixed, ray == k_rays
 
 
-@njit
+@inner
 def measure(hits: tuple[Float, Int, Float], out: tuple[Float, Int, Bool]) -> None:
     """As ``receive`` for a ruler: one ray that always comes back."""
     ranges, found, cos_of = hits
@@ -205,7 +198,7 @@ def measure(hits: tuple[Float, Int, Float], out: tuple[Float, Int, Bool]) -> Non
         marks[col.MIXED, i] = marks[col.GHOST, i] = False
 
 
-@njit
+@inner
 def _correction(error: tuple[Float, float], place: float, brightness: float) -> float:
     """Systematic error of the unit at a distance, for a reflectivity."""
     by_range, by_reflectivity = error
@@ -215,7 +208,7 @@ def _correction(error: tuple[Float, float], place: float, brightness: float) -> 
     return smooth + by_reflectivity * (2.0 * min(max(brightness, 0.0), 1.0) - 1.0)
 
 
-@njit
+@inner
 def send(  # noqa: C901, PLR0913 (kernel)
     received: tuple[Float, Int],
     reflectivity: Float,
@@ -271,3 +264,32 @@ def send(  # noqa: C901, PLR0913 (kernel)
         if value > limit + 1e-9 or place > limit:  # the code itself is no round number
             value = math.inf
         ranges[i] = value
+
+
+@njit
+def scan(  # noqa: PLR0913 (kernel)
+    hits: tuple[Float, Int, Float],
+    mirrored: tuple[Float, Int, Float],
+    surface: tuple[Float, Bool, Int],
+    receiver: tuple[bool, Float, tuple[bool, bool, float], Float],
+    sender: tuple[tuple[Float, float], tuple[float, float, float, float], Float],
+    errors: tuple[float, float],
+    draws: tuple[Float, Float, Float],
+    room: tuple[Float, Int, Bool],
+    out: tuple[NDArray[np.float32], NDArray[np.int32]],
+) -> None:
+    """``receive`` or ``measure``, then ``send``.
+
+    surface   reflectivity, polished, owner
+    receiver  whether it is a ruler; weights, switches, needed
+    sender    error, steps, bands
+    draws     chances of mixed pixels, normal noise, chances of a loss
+    room      what ``receive`` fills
+    """
+    ruler, weights, switches, needed = receiver
+    if ruler:
+        measure(hits, room)
+    else:
+        receive(hits, mirrored, surface[:2], weights, switches, needed, draws[0], room)
+    error, steps, bands = sender
+    send(room[:2], surface[0], surface[2], error, draws[1:], steps, bands, errors, out)

@@ -16,7 +16,7 @@ import numpy as np
 
 from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3
-from slam._jit import njit
+from slam._jit import inner, njit
 
 BUCKETS = 64
 
@@ -24,17 +24,24 @@ BUCKETS = 64
 class Noted(NamedTuple):
     """Where things were at some moments of a scan.
 
-    ids, rows  geoms of the caster, and which of these are noted
-    xpos...    ``geom_xpos``, ``geom_xmat``, ``site_xpos``, ``site_xmat`` of the model's data
+    ids        (n,) geoms of the caster
+    runs       (bodies, 4) in the columns of ``sim.sensors.lidar.columns``
+    places     (bodies, 7) position and quaternion of each at the scan's first note
+    xpos...    ``xpos``, ``xquat``, ``geom_xpos``, ``geom_xmat``, ``site_xpos``, ``site_xmat`` of
+               the model's data
     site       of the laser, -1 for none
-    poses      (slots, n, 12); ``lasers`` (slots, 3)
+    poses      (slots, n, 12); what has not moved since the first slot stands in that one alone
+    lasers     (slots, 3)
     filled     (1,) number of slots
     """
 
     ids: Int
-    rows: Int
+    runs: Int
+    places: Float
     xpos: Float
-    xmat: Float
+    xquat: Float
+    geom_xpos: Float
+    geom_xmat: Float
     site_xpos: Float
     site_xmat: Float
     site: int
@@ -47,25 +54,42 @@ class Noted(NamedTuple):
 def note(noted: tuple[Any, ...]) -> None:
     """Take over where geoms and laser are now, into the next slot.
 
-    noted  ``Noted``, from Python as a plain tuple: a named one costs more than the work
+    noted  ``Noted``, as a plain tuple: a named one costs more than the work
     """
-    ids, rows, xpos, xmat, site_xpos, site_xmat, site, poses, lasers, filled = noted
+    ids, runs, places, xpos, xquat, geom_xpos, geom_xmat = noted[:7]
+    site_xpos, site_xmat, site, poses, lasers, filled = noted[7:]
     slot = filled[0]
     filled[0] += 1
-    for row in range(rows.size):
-        j = rows[row]
-        g = ids[j]
-        for i in range(3):
-            poses[slot, j, col.PX + i] = xpos[g, i]
-        for i in range(9):
-            poses[slot, j, col.R00 + i] = xmat[g, i]
+    for k in range(runs.shape[0]):
+        body, first, end = runs[k, col.RUN_BODY], runs[k, col.RUN_FIRST], runs[k, col.RUN_END]
+        if runs[k, col.RUN_STATE] != col.MOVES:
+            if (
+                places[k, 0] == xpos[body, 0]
+                and places[k, 1] == xpos[body, 1]
+                and places[k, 2] == xpos[body, 2]
+                and places[k, 3] == xquat[body, 0]
+                and places[k, 4] == xquat[body, 1]
+                and places[k, 5] == xquat[body, 2]
+                and places[k, 6] == xquat[body, 3]
+            ):
+                continue  # it stands, to the last bit
+            poses[1:slot, first:end] = poses[0, first:end]
+        runs[k, col.RUN_STATE] = col.MOVES
+        if slot == 0:
+            runs[k, col.RUN_STATE] = col.PLACED
+            places[k, :3], places[k, 3:] = xpos[body], xquat[body]
+        for j in range(first, end):
+            for i in range(3):
+                poses[slot, j, col.PX + i] = geom_xpos[ids[j], i]
+            for i in range(9):
+                poses[slot, j, col.R00 + i] = geom_xmat[ids[j], i]
     if site >= 0:
         lasers[slot, col.LASER_X] = site_xpos[site, 0]
         lasers[slot, col.LASER_Y] = site_xpos[site, 1]
         lasers[slot, col.LASER_YAW] = math.atan2(site_xmat[site, 3], site_xmat[site, 0])
 
 
-@njit
+@inner
 def _horizontal_bound(table: Float, j: int, poses: Float, slot: int) -> float:
     """Radius of a vertical cylinder about the geom's centre that contains it."""
     kind = int(table[j, col.KIND])
@@ -85,33 +109,32 @@ def _horizontal_bound(table: Float, j: int, poses: Float, slot: int) -> float:
 
 
 @njit
-def enclose(table: Float, rows: Int, poses: Float, slots: int, bounds: Float) -> None:
-    """Renew the bounds of the geoms ``rows`` from their poses in the first ``slots`` slots."""
-    last, body, moved = slots - 1, -1.0, False
-    for row in range(rows.size):
-        j = rows[row]
-        if table[j, col.BODY] != body:  # else it moved as the last one did
-            body, moved = table[j, col.BODY], False
-            for s in range(last):
-                # First row and column of a rotation that changes little tell all of it.
-                for i in (col.PX, col.PY, col.PZ, col.R00, col.R01, col.R10):
-                    moved = moved or poses[s, j, i] != poses[last, j, i]
-        radius, half = _horizontal_bound(table, j, poses, last), table[j, col.HALF_HEIGHT]
-        x, y, z = poses[last, j, col.PX], poses[last, j, col.PY], poses[last, j, col.PZ]
-        if moved:
-            x, y = 0.5 * (x + poses[0, j, col.PX]), 0.5 * (y + poses[0, j, col.PY])
-            radius, lift = 0.0, 0.0
-            for s in range(slots):
-                dx, dy = poses[s, j, col.PX] - x, poses[s, j, col.PY] - y
-                reach = _horizontal_bound(table, j, poses, s) + math.sqrt(dx * dx + dy * dy)
-                radius, lift = max(radius, reach), max(lift, abs(poses[s, j, col.PZ] - z))
-            half += lift
-        bounds[j, col.DISC_X], bounds[j, col.DISC_Y], bounds[j, col.DISC_Z] = x, y, z
-        bounds[j, col.DISC_RADIUS], bounds[j, col.DISC_HALF] = radius, half
-        bounds[j, col.MOVED] = 1.0 if moved else 0.0
+def enclose(table: Float, runs: Int, poses: Float, slots: int, bounds: Float) -> None:
+    """Renew the bounds of what does not rest as before from its poses in the first ``slots``."""
+    for k in range(runs.shape[0]):
+        if runs[k, col.RUN_STATE] == col.RESTS:
+            continue
+        moves = runs[k, col.RUN_STATE] == col.MOVES
+        last = slots - 1 if moves else 0
+        if not moves:
+            runs[k, col.RUN_STATE] = col.RESTS
+        for j in range(runs[k, col.RUN_FIRST], runs[k, col.RUN_END]):
+            radius, half = _horizontal_bound(table, j, poses, last), table[j, col.HALF_HEIGHT]
+            x, y, z = poses[last, j, col.PX], poses[last, j, col.PY], poses[last, j, col.PZ]
+            if moves:
+                x, y = 0.5 * (x + poses[0, j, col.PX]), 0.5 * (y + poses[0, j, col.PY])
+                radius, lift = 0.0, 0.0
+                for s in range(slots):
+                    dx, dy = poses[s, j, col.PX] - x, poses[s, j, col.PY] - y
+                    reach = _horizontal_bound(table, j, poses, s) + math.sqrt(dx * dx + dy * dy)
+                    radius, lift = max(radius, reach), max(lift, abs(poses[s, j, col.PZ] - z))
+                half += lift
+            bounds[j, col.DISC_X], bounds[j, col.DISC_Y], bounds[j, col.DISC_Z] = x, y, z
+            bounds[j, col.DISC_RADIUS], bounds[j, col.DISC_HALF] = radius, half
+            bounds[j, col.MOVED] = 1.0 if moves else 0.0
 
 
-@njit
+@inner
 def _azimuth(y: float, x: float) -> float:
     """atan2 to 1.2e-5 rad (Abramowitz and Stegun 4.4.49), four times faster; only for bounds."""
     ax, ay = abs(x), abs(y)
@@ -125,7 +148,7 @@ def _azimuth(y: float, x: float) -> float:
     return angle if y >= 0.0 else -angle
 
 
-@njit
+@inner
 def _half_angle(radius: float, distance: float) -> float:
     """Half the angle a disc fills from ``distance`` > ``radius``, or a little more."""
     ratio = radius / distance
@@ -134,7 +157,7 @@ def _half_angle(radius: float, distance: float) -> float:
     return _azimuth(radius, math.sqrt((distance - radius) * (distance + radius)))
 
 
-@njit
+@inner
 def _box_extent(table: Float, poses: Float, j: int, dx: float, dy: float, spread: float) -> Vec3:
     """(nearest distance, lowest, highest azimuth) of an upright box whose centre is at (dx, dy).
 
@@ -170,7 +193,7 @@ def _box_extent(table: Float, poses: Float, j: int, dx: float, dy: float, spread
     return clear - spread, low - widen, high + widen
 
 
-@njit
+@inner
 def _origins(fan: Float) -> Vec3:
     """(mid x, mid y, largest distance of any beam's origin from there)."""
     last, spread = fan.shape[0] - 1, 0.0
@@ -182,7 +205,7 @@ def _origins(fan: Float) -> Vec3:
     return mid_x, mid_y, math.sqrt(spread)
 
 
-@njit
+@inner
 def find_windows(  # noqa: PLR0913 (kernel)
     table: Float,
     poses: Float,
@@ -241,7 +264,7 @@ def find_windows(  # noqa: PLR0913 (kernel)
     return found
 
 
-@njit
+@inner
 def nearest_first(windows: Float, found: int, order: Int) -> None:
     """Order of the first ``found`` windows by distance, to 0.25 m: enough, and three times faster
     than a sort."""

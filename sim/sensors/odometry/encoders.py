@@ -81,7 +81,7 @@ class WheelOdometry:
         slips = (c.slip_per_m, c.slip_per_contact_m)
         own = (c.ticks_per_m, track, track / self.errors[1], *gain)
         self._parameters = np.array([*(std**2 for std in squares), *slips, *own])
-        self._wheels: Float = np.zeros((3, 2))
+        self._wheels: Float = np.zeros((3, 3))
         self._poses: Float = np.zeros((3, 3))
         self._poses[:2] = np.array(start, dtype=np.float64)
         self._spread: Float = np.zeros((3, 3, 3))
@@ -102,17 +102,17 @@ class WheelOdometry:
     def ticks(self) -> NDArray[np.int64]:
         """(2,) encoder counts; without quantisation those of 100 ticks per mm."""
         per_m = self.config.ticks_per_m or 100_000.0
-        counted = self._wheels[COUNTED].tolist()
+        counted = self._wheels[COUNTED, :2].tolist()
         return np.array([math.floor(m * per_m + 0.5) for m in counted], dtype=np.int64)
 
     def update(self, travel: Sequence[float] | Float, *, contact: bool = False) -> None:
-        """Advance to the true rim travel (left m, right m) since the start of the run.
+        """Advance to the true rim travel (left m, right m; sideways m) since the start of the run.
 
         ``contact``: the robot touched something on the way, which makes slip likelier.
         """
-        left, right = (float(rim) for rim in travel)
+        left, right, *side = (float(rim) for rim in travel)
         update(
-            (left, right), contact, self._parameters,
+            (left, right, side[0] if side else 0.0), contact, self._parameters,
             self._rng.standard_normal(3), self._rng.random(2),
             self._wheels, self._poses, self._spread,
         )  # fmt: skip
@@ -136,7 +136,7 @@ class WheelOdometry:
     def over_scan(self, travel: Float, first: float, last: float, *, contact: bool) -> None:
         """Advance to the first beam of a scan, which closes the motion increment, and to the last.
 
-        travel       (steps + 1, 2) true rim travel m at the physics steps of the scan
+        travel       (steps + 1, 3) true rim travel m at the physics steps of the scan
         first, last  when its first and last beam are, in steps
         """
         rng = self._rng

@@ -2,14 +2,16 @@
 """The odometry of a log, fitted: how its increments err, and others that err the same way.
 
 An increment of the wheels is the true one and an error: a share of the distance, a turn for each
-metre and for each radian turned, and a rest whose variance grows with both. The rest of a twin is
-the log's own, drawn again with replacement, so that slips stay as rare and as large as they were.
+metre and for each radian turned, and a rest. The reference, too, errs from scan to scan. Over a
+window of increments its part stays as large as it is, and that of the wheels grows. So slopes and
+variances are those of windows, and what does not grow is no part of a twin's odometry. The rest of
+a twin is the log's own, drawn again with replacement: slips stay as rare and as large as they were.
 """
 
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass, replace
+from dataclasses import dataclass
 from itertools import pairwise
 from typing import Any
 
@@ -22,9 +24,11 @@ from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 LEAST = 10  # increments, to fit anything
+WINDOW = 16  # increments of the windows that tell slopes: 6 to 17 m of the logs' ways
+LONGEST = 0.25  # of the increments are in the longest window that tells variances
 ROBUST = 4.0  # medians of the rest: what is larger is a slip, which decides no slope
 DIGITS = 9  # kept: the last ones of a fit are another CPU's
-FLOOR_M, FLOOR_RAD = 1e-4, 1e-4  # least deviation of an increment, about that of printed digits
+FLOOR = 1e-4  # m, rad: least deviation of an increment, about that of printed digits
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -33,8 +37,10 @@ class OdometryFit:
 
     scale       m too much for each metre        side  m to the left for each metre
     turn_per_m  rad for each metre               turn_scale  rad too much for each radian
-    variances   (3, 3) rows x, y, heading: for each metre, for each radian, floor
+    variances   (2, 3) rows x and y, heading: for each metre, for each radian, of the reference
     rests       (n, 3) what is left, in deviations of these variances
+
+    In the first three, metres backwards are negative.
     """
 
     scale: float
@@ -47,9 +53,9 @@ class OdometryFit:
     def words(self) -> dict[str, Any]:
         """As it is written."""
         spread = {
-            f"{what} per sqrt {by}": math.sqrt(self.variances[row, column])
-            for row, what in enumerate(("m", "sideways m", "rad"))
-            for column, by in enumerate(("m", "rad"))
+            f"{unit} {what}": math.sqrt(self.variances[row, column])
+            for row, unit in enumerate(("m", "rad"))
+            for column, what in enumerate(("per sqrt m", "per sqrt rad", "of the reference"))
         }
         return {
             "m per m": self.scale, "sideways m per m": self.side, "rad per m": self.turn_per_m,
@@ -58,51 +64,86 @@ class OdometryFit:
 
     def drawn(self, true: Float, rng: np.random.Generator) -> Float:
         """(n, 3) odometry along true poses (n, 3), from its own origin, with errors like these."""
+        steps, wheels = _steps(true), self.variances * [1.0, 1.0, 0.0]
+        rests = self.rests[rng.integers(len(self.rests), size=len(steps))]
+        slopes = np.array([self.scale, self.side, self.turn_per_m, self.turn_scale])
+        steps += _by_slope(steps, slopes) + rests * _sigmas(steps, wheels)
         out = np.zeros((len(true), 3))
-        for k in range(1, len(true)):
-            step = se2.between(true[k - 1], true[k])
-            rest = self.rests[int(rng.integers(len(self.rests)))]
-            out[k] = se2.compose(out[k - 1], self._off(step) + rest * self._sigma(step))
+        for k, step in enumerate(steps):
+            out[k + 1] = se2.compose(out[k], step)
         return out
-
-    def _off(self, step: Float) -> Float:
-        metres, turned = float(np.hypot(step[0], step[1])), float(step[2])
-        x = step[0] + self.scale * metres
-        y, heading = step[1] + self.side * metres, turned * (1.0 + self.turn_scale)
-        return np.array([x, y, heading + self.turn_per_m * metres])
-
-    def _sigma(self, step: Float) -> Float:
-        metres, turned = np.hypot(step[0], step[1]), abs(step[2])
-        by_metre, by_rad, floor = self.variances.T
-        sigma: Float = np.sqrt(by_metre * metres + by_rad * turned + floor)
-        return sigma
 
 
 def fitted(odometry: Float, true: Float) -> OdometryFit:
     """Of a log's odometry and its true poses, each (n, 3); ``InvalidValueError`` for too few."""
     if len(odometry) <= LEAST:
         raise InvalidValueError(f"odometry of {len(odometry)} poses, more than {LEAST} are needed")
-    steps = np.array([se2.between(a, b) for a, b in pairwise(true)])
-    wheels = np.array([se2.between(a, b) for a, b in pairwise(odometry)])
-    errors = wheels - steps
+    steps, headings = _steps(true), true[:-1, 2]
+    errors = _steps(odometry) - steps
     errors[:, 2] = se2.wrap_array(errors[:, 2])
-    metres, turned = np.hypot(steps[:, 0], steps[:, 1]), steps[:, 2]
-    (scale,) = _slopes(errors[:, 0], metres[:, None])
-    (side,) = _slopes(errors[:, 1], metres[:, None])
-    turn_per_m, turn_scale = _slopes(errors[:, 2], np.column_stack([metres, turned]))
-    rests = errors - np.column_stack(
-        [scale * metres, side * metres, turn_per_m * metres + turn_scale * turned]
-    )
-    sizes = np.column_stack([metres, np.abs(turned)])
-    floors = np.array([FLOOR_M, FLOOR_M, FLOOR_RAD]) ** 2
-    grown = np.array([nnls(sizes, rests[:, k] ** 2)[0] for k in range(3)])
-    variances = np.column_stack([grown, floors])
-    fit = OdometryFit(
-        scale=scale, side=side, turn_per_m=turn_per_m, turn_scale=turn_scale,
-        variances=np.round(variances, DIGITS), rests=rests,
+    n, metres = min(WINDOW, max(1, int(LONGEST * len(steps)))), steps[:, :1]
+    along = _turned(np.hstack([metres, 0.0 * metres]), headings)  # m, in the frame of the map
+    left = np.column_stack([-along[:, 1], along[:, 0]])
+    by = np.column_stack([_windows(along, n).ravel(), _windows(left, n).ravel()])
+    places = _slopes(_windows(_turned(errors[:, :2], headings), n).ravel(), by)
+    turns = _slopes(_windows(errors[:, 2:], n).ravel(), _windows(steps[:, ::2], n))
+    rests = errors - _by_slope(steps, np.array([*places, *turns]))
+    placed = _variances(_turned(rests[:, :2], headings) / math.sqrt(2.0), steps)
+    variances = np.array([placed, _variances(rests[:, 2:], steps)])
+    return OdometryFit(
+        scale=places[0], side=places[1], turn_per_m=turns[0], turn_scale=turns[1],
+        variances=variances, rests=np.round(rests / _sigmas(steps, variances), DIGITS),
     )  # fmt: skip
-    sigma = np.array([fit._sigma(step) for step in steps])
-    return replace(fit, rests=np.round(rests / sigma, DIGITS))
+
+
+def _steps(poses: Float) -> Float:
+    return np.array([se2.between(a, b) for a, b in pairwise(poses)])
+
+
+def _turned(rows: Float, headings: Float) -> Float:
+    """(n, 2) rows, each turned by its heading: sums of them tell where the way leads."""
+    c, s = np.cos(headings), np.sin(headings)
+    return np.column_stack([c * rows[:, 0] - s * rows[:, 1], s * rows[:, 0] + c * rows[:, 1]])
+
+
+def _windows(rows: Float, n: int) -> Float:
+    """Sums of n successive rows."""
+    sums = np.vstack([np.zeros((1, rows.shape[1])), np.cumsum(rows, axis=0)])
+    out: Float = sums[n:] - sums[:-n]
+    return out
+
+
+def _sizes(steps: Float) -> Float:
+    """(n, 3) by which variances grow: metres, radians; and one."""
+    return np.column_stack([np.hypot(*steps[:, :2].T), np.abs(steps[:, 2]), np.ones(len(steps))])
+
+
+def _sigmas(steps: Float, variances: Float) -> Float:
+    """(n, 3) deviations of x, y, heading."""
+    sigmas = np.sqrt(np.maximum(_sizes(steps) @ variances.T, FLOOR**2))
+    out: Float = sigmas[:, [0, 0, 1]]
+    return out
+
+
+def _by_slope(steps: Float, slopes: Float) -> Float:
+    """(n, 3) errors of steps, but for the rest; slopes in the order of ``OdometryFit``."""
+    scale, side, turn_per_m, turn_scale = slopes
+    metres, turned = steps[:, 0], steps[:, 2]
+    heading = turn_per_m * metres + turn_scale * turned
+    return np.column_stack([scale * metres, side * metres, heading])
+
+
+def _variances(rests: Float, steps: Float) -> Float:
+    """(3,) of ``_sizes``: squared sums of windows of 1, 2, 4, ... rests, all lengths alike."""
+    sizes, rows, squares, n = _sizes(steps), [], [], 1
+    while n <= max(1, int(LONGEST * len(steps))):
+        square = (_windows(rests, n) ** 2).sum(axis=1)
+        usual = max(float(square.mean()), FLOOR**2)
+        rows.append(np.column_stack([_windows(sizes[:, :2], n), np.ones(len(square))]) / usual)
+        squares.append(square / usual)
+        n *= 2
+    out: Float = np.round(nnls(np.concatenate(rows), np.concatenate(squares))[0], DIGITS)
+    return out
 
 
 def _slopes(errors: Float, by: Float) -> tuple[float, ...]:

@@ -8,7 +8,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
 Vec3 = tuple[float, float, float]
@@ -27,7 +27,7 @@ REPORTED, COUNTED, TRUE = 0, 1, 2  # rows of the wheels
 NOW, AT_STAMP, INCREMENT = 0, 1, 2  # rows of the poses
 
 
-@njit
+@inner
 def _turned(distance: float, angle: float) -> tuple[float, float, float, float]:
     """(dx, dy) of an arc of that length and angle, and d(dx)/d(angle), d(dy)/d(angle)."""
     if abs(angle) < 1e-4:
@@ -38,7 +38,7 @@ def _turned(distance: float, angle: float) -> tuple[float, float, float, float]:
     return dx, dy, (distance * c - dx) / angle, (distance * s - dy) / angle
 
 
-@njit
+@inner
 def _chain(pose: Float, bx: float, by: float, angle: float) -> None:
     c, s = math.cos(pose[2]), math.sin(pose[2])
     pose[0] += c * bx - s * by
@@ -46,7 +46,7 @@ def _chain(pose: Float, bx: float, by: float, angle: float) -> None:
     pose[2] += angle
 
 
-@njit
+@inner
 def _accumulate(
     increment: Float, random: Float, systematic: Float, step: Vec3, variances: Vec3, track: float
 ) -> None:
@@ -90,7 +90,7 @@ def _accumulate(
     _chain(increment, bx, by + side, angle)
 
 
-@njit
+@inner
 def _draw(
     distance: float, angle: float, contact: bool, p: Float, normals: Float, uniforms: Float
 ) -> tuple[Vec3, Vec3]:
@@ -114,7 +114,7 @@ def _draw(
 
 @njit
 def update(  # noqa: PLR0913 (kernel)
-    travel: tuple[float, float],
+    travel: Vec3,
     contact: bool,
     p: Float,
     normals: Float,
@@ -123,32 +123,44 @@ def update(  # noqa: PLR0913 (kernel)
     poses: Float,
     spread: Float,
 ) -> None:
-    """Advance all of a run's state to the true rim travel (left m, right m).
+    """Advance all of a run's state to the true rim travel (left m, right m, sideways m).
 
     p       parameters, in the columns named above
-    wheels  (3, 2) m of each rim: reported before ticks, after ticks, true
+    wheels  (3, 3) m of each rim and sideways: reported before ticks, after ticks, true
     poses   (3, 3) now, at the last stamp, increment since then
     spread  (3, 3, 3) random and systematic part of ``_accumulate``, covariance at the stamp
     """
     dl, dr = travel[0] - wheels[TRUE, 0], travel[1] - wheels[TRUE, 1]
+    side = travel[2] - wheels[TRUE, 2]
     distance, angle = 0.5 * (dl + dr), (dr - dl) / p[TRACK]
-    variances, noise = _draw(abs(distance), abs(angle), contact, p, normals, uniforms)
-    half, counted = 0.5 * p[NOMINAL] * noise[2], np.empty(2)
-    for k in range(2):
+    length, ahead, aside = abs(distance), 1.0, 0.0
+    if side != 0.0:  # the error of the length lies along the way
+        length = math.sqrt(distance * distance + side * side)
+        ahead, aside = distance / length, side / length
+    variances, noise = _draw(length, abs(angle), contact, p, normals, uniforms)
+    half, counted = 0.5 * p[NOMINAL] * noise[2], np.empty(3)
+    rims = (
+        p[GAIN] * dl + ahead * noise[0] - half,
+        p[GAIN + 1] * dr + ahead * noise[0] + half,
+        0.5 * (p[GAIN] + p[GAIN + 1]) * side + aside * noise[0],
+    )
+    for k in range(3):
         wheels[TRUE, k] = travel[k]
-        rim = p[GAIN] * dl + noise[0] - half if k == 0 else p[GAIN + 1] * dr + noise[0] + half
-        wheels[REPORTED, k] += rim
+        wheels[REPORTED, k] += rims[k]
         after = wheels[REPORTED, k]
         if p[TICKS] > 0.0:
             after = math.floor(after * p[TICKS] + 0.5) / p[TICKS]
         counted[k] = after - wheels[COUNTED, k]
         wheels[COUNTED, k] = after
     turned = (counted[1] - counted[0]) / p[NOMINAL]
-    _step_pose(poses[NOW], 0.5 * (counted[0] + counted[1]), noise[1], turned)
-    _accumulate(poses[INCREMENT], spread[0], spread[1], (distance, 0.0, angle), variances, p[TRACK])
+    along = 0.5 * (counted[0] + counted[1])
+    _step_pose(poses[NOW], (along, counted[2]), noise[1], turned)
+    _accumulate(
+        poses[INCREMENT], spread[0], spread[1], (distance, side, angle), variances, p[TRACK]
+    )
 
 
-@njit
+@inner
 def close(poses: Float, spread: Float, variances: Vec3) -> None:
     """End the increment here: its covariance, then nothing moved.
 
@@ -166,18 +178,23 @@ def close(poses: Float, spread: Float, variances: Vec3) -> None:
     poses[INCREMENT], spread[:2] = 0.0, 0.0
 
 
-@njit
-def _step_pose(pose: Float, distance: float, side: float, angle: float) -> None:
-    bx, by, _, _ = _turned(distance, angle)
-    _chain(pose, bx, by + side, angle)
+@inner
+def _step_pose(pose: Float, rolled: tuple[float, float], slid: float, angle: float) -> None:
+    bx, by, _, _ = _turned(rolled[0], angle)
+    left, back, _, _ = _turned(rolled[1], angle)  # the same arc, begun to the left
+    _chain(pose, bx - back, by + left + slid, angle)
 
 
-@njit
-def _at(travel: Float, step: float) -> tuple[float, float]:
-    """Between the rows of ``travel`` (steps + 1, 2)."""
+@inner
+def _at(travel: Float, step: float) -> Vec3:
+    """Between the rows of ``travel`` (steps + 1, 3)."""
     k = min(int(step), len(travel) - 2)
-    part, left, right = step - k, travel[k, 0], travel[k, 1]
-    return left + part * (travel[k + 1, 0] - left), right + part * (travel[k + 1, 1] - right)
+    part, here, after = step - k, travel[k], travel[k + 1]
+    return (
+        here[0] + part * (after[0] - here[0]),
+        here[1] + part * (after[1] - here[1]),
+        here[2] + part * (after[2] - here[2]),
+    )
 
 
 @njit
@@ -194,7 +211,7 @@ def over_scan(  # noqa: PLR0913 (kernel)
 ) -> None:
     """Two updates: to the first beam of a scan, where the increment ends, and to the last.
 
-    travel  (steps + 1, 2) m rolled at the steps of the scan; ``span`` the steps of both beams
+    travel  (steps + 1, 3) m rolled at the steps of the scan; ``span`` the steps of both beams
     draws   normals and uniforms of the first update, then of the second
     """
     first, last = _at(travel, span[0]), _at(travel, span[1])

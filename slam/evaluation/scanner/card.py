@@ -51,16 +51,11 @@ STATISTICS: tuple[Statistic, ...] = (
     Statistic(key="step", what="step of the code", unit=MM),
     *_bins("coarse", f"codes that are multiples of {COARSE} steps", PERCENT, COARSE_BINS_M),
     *_noise("standing", "noise of a standing robot"),
-    Statistic(key="slow", what="deviation in a stretch / from scan to scan", unit=PLAIN),
-    Statistic(key="stray", what="returns 15 cm or more off, standing", unit=PERCENT),
     *_noise("wall", "deviation about a straight wall"),
     Statistic(key="no_return", what="no return, all beams", unit=PERCENT),
     Statistic(key="holes", what="no return, within straight walls", unit=PERCENT),
-    Statistic(key="flicker", what="no return between two returns, standing", unit=PERCENT),
     *_bins("between", "edges with a range between the sides, depth", PERCENT, DEPTH_BINS_M),
-    Statistic(key="edge_jumps", what="beams beside an edge that move by 5 cm", unit=PERCENT),
     Statistic(key="edge_lost", what="edges with a lost beam", unit=PERCENT),
-    Statistic(key="place", what="place of those ranges, 0 near to 1 far", unit=PLAIN),
 )
 
 

@@ -9,7 +9,6 @@ from __future__ import annotations
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam.evaluation.scanner.figures import Figures, key_of, ratio
 from slam.evaluation.scanner.stretches import Stretch
@@ -27,14 +26,10 @@ def edges(stretches: Sequence[Stretch]) -> Figures:
 
     between    by their depth, the share with a range between the sides
     edge_lost  share with a beam without a return
-    place      mean of where those ranges lie: 0 at the near side, 1 at the far side
     """
     found = [np.concatenate([_edges(scan) for scan in part.looked_at()]) for part in stretches]
-    mixed = [e[e[:, 1] == 1.0, 2] for e in found]
-    figures = {
-        "edge_lost": ratio([float((e[:, 1] == 2.0).sum()) for e in found], [len(e) for e in found]),
-        "place": ratio([float(m.sum()) for m in mixed], [len(m) for m in mixed]),
-    }
+    lost = [float((e[:, 1] == 2.0).sum()) for e in found]
+    figures = {"edge_lost": ratio(lost, [len(e) for e in found])}
     for low, high in DEPTH_BINS_M:
         own = [e[(e[:, 0] >= low) & (e[:, 0] < high)] for e in found]
         made = ratio([float((e[:, 1] == 1.0).sum()) for e in own], [len(e) for e in own])
@@ -42,15 +37,8 @@ def edges(stretches: Sequence[Stretch]) -> Figures:
     return figures
 
 
-def mixed_beams(ranges: Float) -> NDArray[np.int64]:
-    """(k,) numbers of the beams between two sides, in (n,) ranges m."""
-    found = _edges(ranges)
-    beams: NDArray[np.int64] = found[found[:, 1] == 1.0, 3].astype(np.int64)
-    return beams
-
-
 def _edges(ranges: Float) -> Float:
-    """(k, 4): depth m; 0 clean, 1 between, 2 lost; its place 0..1; number of the beam between."""
+    """(k, 2): depth m of each edge; 0 for clean, 1 with a range between its sides, 2 lost."""
     windows = np.lib.stride_tricks.sliding_window_view(ranges, SIDE)
     low, high = windows.min(axis=1), windows.max(axis=1)  # NaN where one did not return
     flat = high - low <= FLAT_M
@@ -62,14 +50,12 @@ def _edges(ranges: Float) -> Float:
         near, far = np.where(near_right, high[a], high[b]), np.where(near_right, low[b], low[a])
         depth = far - near
         edge = flat[a] & flat[b] & (depth >= DEPTH_BINS_M[0][0]) & (depth < DEPTH_BINS_M[-1][1])
-        at = a[edge] + SIDE
         depth, near, far = depth[edge], near[edge], far[edge]
-        own = ranges[at] if gap else np.full(len(at), np.nan)
-        kind = np.zeros(len(at))
+        kind = np.zeros(len(depth))
         if gap:
+            own = ranges[a[edge] + SIDE]
             kind = np.where(np.isnan(own), 2.0, 0.0)
             kind[(own > near + CLEAR_M) & (own < far - CLEAR_M)] = 1.0
-            depth, near, own, at = (v[kind > 0.0] for v in (depth, near, own, at))
-            kind = kind[kind > 0.0]
-        rows.append(np.stack([depth, kind, (own - near) / depth, at.astype(float)], axis=1))
+            depth, kind = depth[kind > 0.0], kind[kind > 0.0]
+        rows.append(np.stack([depth, kind], axis=1))
     return np.concatenate(rows)

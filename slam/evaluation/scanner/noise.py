@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import dataclass, replace
 from functools import partial
 
 import numpy as np
@@ -20,8 +19,6 @@ from slam.frames import Float
 RANGE_BINS_M = ((0.0, 1.0), (1.0, 2.0), (2.0, 4.0), (4.0, 8.0), (8.0, 16.0), (16.0, 32.0))
 OBLIQUE = math.radians(45.0)  # rad of incidence, which parts walls into two bins
 STRAY_M = 0.15  # m from a beam's median, from which it is no noise: somebody walked by
-EDGE_M = 0.4  # m between neighbours, from which there is an edge
-JUMP_M = 0.05  # m from scan to scan: five sigma and more
 OFTEN = 0.8  # share of scans in which a beam must return to have a median
 LEAST_N = 100  # differences, and
 LEAST_WALLS = 10  # walls, below which a bin says nothing
@@ -29,96 +26,31 @@ Chosen = Callable[[Float, Float], NDArray[np.bool_]]
 """Which of (n,) ranges m and (n,) incidences rad belong to a bin."""
 
 
-@dataclass(frozen=True, kw_only=True)
-class _Tally:
-    """Of one stretch in which the robot stood.
-
-    squares, places, incidences  (n,) of differences of successive scans: their squares, and where
-    about_mean, freedom          squares about the means of beams that always returned
-    stray, returns               returns far from their beam's median; of so many
-    lost, framed                 beams without a return between two that returned; of so many
-    jumps, beside                jumps beside an edge; of so many
-    """
-
-    squares: Float
-    places: Float
-    incidences: Float
-    about_mean: float
-    freedom: int
-    stray: int
-    returns: int
-    lost: int
-    framed: int
-    jumps: int
-    beside: int
-
-
 def standing(stretches: Sequence[Stretch], angles: Float, step_m: float) -> Figures:
-    """A robot at rest before smooth surfaces; ``flicker`` is of all beams.
-
-    standing    one sigma m of what is sent, from differences of successive scans: slow changes have
-                no part in it; by range and incidence, too
-    slow        deviation about the mean of a stretch over that of successive scans; 1 for white
-                noise
-    stray       share of returns ``STRAY_M`` or more from their beam's median
-    flicker     share without a return, of beams that returned just before and just after
-    edge_jumps  share of ranges ``JUMP_M`` or more from those of the scan before, of beams beside an
-                edge: mixed pixels that are drawn anew each time, and beams that hit now one side,
-                now the other
+    """One sigma m of what is sent, of a robot at rest before smooth surfaces: from differences of
+    successive scans, so slow changes have no part in it; also by range and incidence.
     """
-    tallies = [_tally(part.ranges, angles) for part in stretches]
+    tallies = [_differences(part.ranges, angles) for part in stretches]
     sent = partial(sigma_as_sent, step=step_m)
 
     def figure(chosen: Chosen) -> Figure:
-        own = [t.squares[chosen(t.places, t.incidences)] for t in tallies]
+        own = [squares[chosen(places, tilts)] for squares, places, tilts in tallies]
         return ratio([0.5 * s.sum() for s in own], [len(s) for s in own], sent).if_of(LEAST_N)
 
-    white = [t.freedom * 0.5 * float(t.squares.sum()) / max(len(t.squares), 1) for t in tallies]
-    slow = ratio([t.about_mean for t in tallies], white, math.sqrt)
-    return {
-        **_by_bins("standing", figure),
-        "slow": replace(slow, n=sum(t.freedom for t in tallies)),
-        "stray": ratio([t.stray for t in tallies], [t.returns for t in tallies]),
-        "flicker": ratio([t.lost for t in tallies], [t.framed for t in tallies]),
-        "edge_jumps": ratio([t.jumps for t in tallies], [t.beside for t in tallies]),
-    }
+    return _by_bins("standing", figure)
 
 
-def _tally(ranges: Float, angles: Float) -> _Tally:
-    seen = np.isfinite(ranges)
-    around = seen[:-2] & seen[2:]
-    often = seen.mean(axis=0) >= OFTEN
+def _differences(ranges: Float, angles: Float) -> tuple[Float, Float, Float]:
+    """(n,) squares m^2 of differences, ranges m and incidences rad; strays have no part in it."""
+    often = np.isfinite(ranges).mean(axis=0) >= OFTEN
     middle = np.full(ranges.shape[1], np.nan)
     middle[often] = np.nanmedian(ranges[:, often], axis=0)
-    jumps = np.abs(np.diff(ranges[:, _beside_edges(middle)], axis=0))
     beams, incidence = smooth(middle, angles)
     own, middle = ranges[:, beams], middle[beams]
-    kept = np.abs(own - middle) < STRAY_M  # False for NaN
-    returns = int(np.isfinite(own).sum())
-    own = np.where(kept, own, np.nan)
-    step = np.diff(own, axis=0)
+    step = np.diff(np.where(np.abs(own - middle) < STRAY_M, own, np.nan), axis=0)
     pairs = np.isfinite(step)
-    whole = own[:, np.isfinite(own).all(axis=0)]
-    return _Tally(
-        squares=step[pairs] ** 2,
-        places=np.broadcast_to(middle, step.shape)[pairs],
-        incidences=np.broadcast_to(incidence, step.shape)[pairs],
-        about_mean=float(((whole - whole.mean(axis=0)) ** 2).sum()),
-        freedom=(len(whole) - 1) * whole.shape[1],
-        stray=returns - int(kept.sum()),
-        returns=returns,
-        lost=int((around & ~seen[1:-1]).sum()),
-        framed=int(around.sum()),
-        jumps=int((jumps >= JUMP_M).sum()),
-        beside=int(np.isfinite(jumps).sum()),
-    )
-
-
-def _beside_edges(ranges: Float) -> NDArray[np.bool_]:
-    """(n,) beams of which a neighbour is ``EDGE_M`` or more nearer or farther."""
-    edge = np.abs(np.diff(ranges)) >= EDGE_M  # False for NaN
-    beside: NDArray[np.bool_] = np.append(edge, False) | np.append(False, edge)
-    return beside
+    at, tilts = (np.broadcast_to(one, step.shape)[pairs] for one in (middle, incidence))
+    return step[pairs] ** 2, at, tilts
 
 
 def about_walls(found: Sequence[Sequence[Wall]]) -> Figures:

@@ -93,7 +93,7 @@ class GlobalConfig(Settings):
     coarsest_rad: float = number(0.1, "rad", "largest step of heading", low=1e-3, high=0.5)
 
 
-PRICE = "scripts/experiments/prices.py, on one core of a Xeon that others use too"
+PRICE = "measured on one core of a Xeon that others use too"
 
 
 @dataclass(frozen=True, kw_only=True)

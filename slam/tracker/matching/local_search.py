@@ -15,8 +15,7 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
-from slam.compiling import announced
+from slam._jit import announced, njit
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap

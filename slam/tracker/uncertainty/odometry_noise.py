@@ -15,8 +15,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float, Odometry
-from slam.frontend.odometry_bias import HeadingBias
-from slam.frontend.odometry_prior import Prediction, predict
+from slam.frontend.odometry_prior import HeadingBias, Prediction, predict
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import innovation
@@ -47,7 +46,7 @@ class OdometryNoise:
         the noise of beams says; ``least_stated``: least scale of a covariance that a log states.
         """
         self._whole, self._overlaps = config, overlaps
-        self._config, self._prior = config.uncertainty.odometry, config.frontend.prior
+        self._config = config.uncertainty.odometry
         self._least_stated = least_stated
         self.scales: Float = np.ones(2)
         self.nis: float | None = None
@@ -89,7 +88,7 @@ class OdometryNoise:
             self.scales = self._squares / self._expected
         scales = float(self.scales[0]), float(self.scales[1])
         self._stated = stated
-        return predict(T_map_before, before, now, scales, self.bias, self._prior)
+        return predict(T_map_before, before, now, scales, self.bias)
 
     def learn(self, prediction: Prediction, match: Match, sensor_sigma_m: float) -> None:
         """Compare the increment with a match that is used, by ranges of that sigma."""

@@ -16,11 +16,10 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from scripts.comparison import csv_files, folder, make, schema, tables
+from scripts.comparison import csv_files, folder, make
 from scripts.comparison.entry import lost_at
 from scripts.comparison.plan import Plan
 from scripts.comparison.rules import Table, number, word
-from scripts.experiments import dynamism_curve
 from scripts.option_names import Verb, repeated
 from scripts.options import levels
 from scripts.verbs import compare as verb
@@ -254,37 +253,6 @@ def test_what_cannot_be_compared_is_said_in_a_line(tmp_path):
         make.carry_out(Plan(slams=("odometry",), **PLAN), tmp_path / "mine")
     with pytest.raises(LogFormatError):
         folder.read(tmp_path)
-
-
-def rows_rising(slam: str, errors) -> list[dict]:
-    return [
-        {"scene": "arena", "dynamism": level, "seed": seed, "slam": slam, "outcome": "finished",
-         "ate_unaligned_m": error * (1.0 + 0.01 * seed), "lost": 0,
-         "moving_share_of_returns": 0.05 * level}
-        for level, error in zip((0.0, 0.5, 1.0), errors, strict=True)
-        for seed in range(4)
-    ]  # fmt: skip
-
-
-def test_the_dynamism_curve(tmp_path, capsys):
-    """Rank correlations over the medians of the levels, and a picture."""
-    from scripts.output import write_recipe
-
-    rows = rows_rising("ekf", (0.1, 0.2, 0.9)) + rows_rising("odometry", (0.3, 0.1, 0.2))
-    settings = {"compare_schema": schema.SCHEMA, "scenes": ["arena"], "slams": ["ekf", "odometry"]}
-    settings |= {"levels": [0.0, 0.5, 1.0], "seeds": [0, 1, 2, 3], "seconds": 60.0, "every": 8}
-    settings |= {"scanner": "full", "scan_limit_s": 10.0, "lost_rule": "far off"}
-    settings |= {"machine": {"processor": "an abacus"}}
-    write_recipe(tmp_path, "compare", settings)
-    folder.write_table(tmp_path / "levels.csv", tables.levels(rows))
-    found = {row["slam"]: row for row in dynamism_curve.correlations(folder.read(tmp_path))}
-    assert found["ekf"]["ATE"] == pytest.approx(1.0)
-    assert found["odometry"]["ATE"] == pytest.approx(-0.5)
-    assert np.isnan(found["ekf"]["lost"])
-    assert dynamism_curve.main([str(tmp_path), "--out", str(tmp_path / "curve.png")]) == 0
-    assert "ekf" in capsys.readouterr().out
-    assert (tmp_path / "curve.png").stat().st_size > 10_000
-    assert dynamism_curve.main([str(tmp_path / "nowhere")]) == 1
 
 
 def test_a_failure_in_a_table_is_no_formula(tmp_path):

@@ -8,7 +8,7 @@ import pytest
 
 from scripts.days.lifelong import COLUMNS
 from scripts.days.report import summed
-from scripts.days.tables import last_session, printed, verdict
+from scripts.days.tables import last_session, printed
 from scripts.days.truth import Spot, Still, scored, stands_there
 from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.days.changes import Change
@@ -62,23 +62,12 @@ def row(session, **values):
     return {**dict.fromkeys(COLUMNS), "slam": "s", "session": session, "map": "merged", **values}
 
 
-def test_the_verdict_counts_sessions_found_and_the_last_error_against_the_first():
-    rows = [
-        row(0, map="new", found_after_s=0.0, place="right", rmse_m=0.02),
-        row(1, found_after_s=0.8, place="right", rmse_m=0.02),
-        row(2, found_after_s=12.0, place="right", rmse_m=0.03),
-        row(3, map="m.apart1.npz", place="not found"),
-    ]
-    said = verdict(rows)
-    assert said.startswith("2 of 3 sessions found, 1 within 10 s, 0 at a wrong place")
-    assert "1.50 of the first's" in said
+def test_a_page_says_how_the_last_session_ended():
+    rows = [row(2, found_after_s=12.0, place="right"), row(3, map="m.apart1.npz")]
     (session, *_) = printed("s", rows, whole=True).columns
-    assert "3" in list(session.cells)
-    alone = [row(0, map="anew"), row(1, map="anew", place="failed")]
-    said = "in a frame of its own; failed in 1 of 2 sessions, first: `scan 3: 'x'`"
-    assert verdict(alone, "scan 3: `x`\nmore").endswith(said)
-    assert last_session(alone, "1 thing moved") == "Session 1: 1 thing moved; `s` failed."
-    assert verdict(alone[:1]).endswith("in a frame of its own")
+    assert list(session.cells) == ["2", "3"]
+    failed = [row(1, map="anew", place="failed")]
+    assert last_session(failed, "1 thing moved") == "Session 1: 1 thing moved; `s` failed."
 
 
 def test_sessions_follow_the_clock():

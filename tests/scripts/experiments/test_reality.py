@@ -20,13 +20,14 @@ def files(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> tuple[Path, Path]:
     found = tmp_path / "predicted.json", tmp_path / "real.json"
     monkeypatch.setattr(reality, "PREDICTED", found[0])
     monkeypatch.setattr(reality, "REAL", found[1])
+    monkeypatch.setattr(reality, "AFTER", tmp_path / "after.json")
     return found
 
 
 def test_nothing_is_predicted_once_it_is_known(files: tuple[Path, Path], tmp_path: Path) -> None:
     with pytest.raises(InvalidValueError, match="predict first"):
         reality.real(tmp_path, ("intel",), ("odometry",))
-    files[1].write_text("{}")
+    files[1].write_text('{"intel": {"odometry": 1.0}}')
     with pytest.raises(InvalidValueError, match="a prediction comes before"):
         reality.predict(tmp_path, ("intel",), ("odometry",))
 

@@ -24,10 +24,8 @@ from slam.frames import LaserSpec, Scan
 from slam.system import create
 
 NAMES = (
-    "ablation", "accuracy", "association_effort", "breaking_point", "change_share",
-    "corner_recall", "covariance_scores", "habits", "honesty", "kidnap", "log_defects", "loops",
-    "penetration", "pushes", "range_error", "rates", "scanners", "share_seen",
-    "trust_in_returns", "tune_ekf", "uncertainty", "verdict_tracks",
+    "ablation", "accuracy", "habits", "logs", "range_error", "rates",
+    "scanners", "share_seen", "uncertainty",
 )  # fmt: skip
 STUDIES = {name: importlib.import_module(f"scripts.experiments.{name}").STUDY for name in NAMES}
 
@@ -97,7 +95,7 @@ def test_a_stream_is_a_scene_or_a_track_at_its_level():
 
 
 def test_each_value_of_a_scanner_is_another_drive():
-    for name in ("accuracy", "breaking_point", "range_error", "scanners", "uncertainty"):
+    for name in ("accuracy", "range_error", "scanners", "uncertainty"):
         one = STUDIES[name]
         cases = one.cases(one._parser().parse_args([]))
         wanted = {case["scanner"] for case in cases}

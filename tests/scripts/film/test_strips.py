@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scripts.film.strips import GAP, LABEL, MARGIN, evenly, strips
+from scripts.film.strips import GAP, LABEL, MARGIN, evenly, strip
 from slam.errors import InvalidValueError
 
 
@@ -19,7 +19,9 @@ def plain(level: int) -> np.ndarray:
 
 def test_pictures_stand_side_by_side_in_the_order_of_time(tmp_path: Path):
     path = tmp_path / "strip.png"
-    whole = strips({"": [plain(10), plain(20), plain(30)]}, [0.0, 1.5, 3.0], path, cell_width=80)
+    whole = strip(
+        [plain(10), plain(20), plain(30)], [0.0, 1.5, 3.0], path, columns=3, cell_width=80
+    )
     with Image.open(path) as image:
         np.testing.assert_array_equal(np.asarray(image), whole)
     for k, level in enumerate((10, 20, 30)):
@@ -29,19 +31,11 @@ def test_pictures_stand_side_by_side_in_the_order_of_time(tmp_path: Path):
         assert whole[6 : 6 + LABEL, x : x + 80].min() < 200  # its time is written above it
 
 
-def test_two_runs_stand_under_one_another(tmp_path: Path):
-    seconds = [0.0, 2.0]
-    both = strips({"with": [plain(0), plain(1)], "without": [plain(2), plain(3)]}, seconds)
-    one = strips({"": [plain(0), plain(1)]}, seconds)
-    assert both.shape[1] == one.shape[1]
-    assert both.shape[0] > 2 * 225
-    assert {0, 1, 2, 3} <= set(np.unique(both).tolist())
-    assert list(tmp_path.iterdir()) == []
-
-
-def test_many_moments_go_over_several_lines():
+def test_many_moments_go_over_several_lines(tmp_path: Path):
     pictures = [plain(k) for k in range(5)]
-    whole = strips({"": pictures}, [float(k) for k in range(5)], columns=3, cell_width=160)
+    whole = strip(
+        pictures, [float(k) for k in range(5)], tmp_path / "s.png", columns=3, cell_width=160
+    )
     assert whole.shape[1] == 2 * MARGIN + 3 * 160 + 2 * GAP
     assert set(range(5)) <= set(np.unique(whole).tolist())
 
@@ -53,24 +47,12 @@ def test_evenly():
         evenly(0, 0.0, 1.0)
 
 
-@pytest.mark.parametrize(
-    ("pictures", "seconds", "says"),
-    [
-        ([plain(0)], [0.0, 1.0], "1 pictures for 2 moments"),
-        ([], [], "at least 1 moment"),
-        ([plain(0), plain(0)[:50]], [0.0, 1.0], "of one size"),
-    ],
-)
-def test_what_does_not_fit_is_named(pictures, seconds, says):
-    with pytest.raises(InvalidValueError, match=says):
-        strips({"": pictures}, seconds)
-
-
-def test_a_legend_stands_below_and_wraps():
+def test_a_legend_stands_below_and_wraps(tmp_path: Path):
     parts = [np.full((40, 60, 3), 10, np.uint8)]
     legend = [("one of the colours", (1, 2, 3)), ("another of the colours", (4, 5, 6))]
     bare, told = (
-        strips({"": parts}, [0.0], cell_width=200, legend=named) for named in ((), legend)
+        strip(parts, [0.0], tmp_path / "s.png", columns=1, cell_width=200, legend=named)
+        for named in ((), legend)
     )
     below = told[len(bare) - MARGIN :]
     for _, color in legend:  # in a line of its own each, as both are wider than the strip

@@ -9,9 +9,9 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from scripts.experiments.kidnap import kidnapped, targets
 from scripts.integrity import fit, reliability, sources, weights
 from scripts.integrity.belief_picture import shares
+from scripts.integrity.kidnap import kidnapped, targets
 from scripts.integrity.labelled import Labelled, labelled
 from scripts.integrity.plane import StreamSpec, frames
 from scripts.integrity.reliability import curve, off_by

@@ -3,23 +3,38 @@
 
 from __future__ import annotations
 
+import threading
+import time
+from contextlib import closing
+from dataclasses import replace
+from pathlib import Path
+
 import numpy as np
 import pytest
 
 from scripts.live.hands import Hands
-from scripts.live.network import Network
+from scripts.live.network import TAKES, Network
 from scripts.live.requests import Drive, Kidnap, MoveDoor, Push
+from scripts.live.session import Opener
+from sim.moments import Moment
+from sim.recording.bag import BagWriter
 from sim.simulation import Simulation
-from slam.ros.link import Taken
+from slam.ros.child import Domain
+from slam.ros.heard import decoded, transform_of
+from slam.ros.link import MIDDLEWARES, Taken, open_link
 from slam.ros.navigation_messages import StartMessage
-from slam.ros.template import STORE, message
-from tests.slam.ros.frames import InMemory
+from slam.ros.node import TF
+from slam.ros.serve import Served
+from slam.ros.template import STORE, message, said_ns
+from slam.system import create
+from tests.scripts.live.test_session import carmen
+from tests.slam.ros.frames import SPEC, InMemory, driven
 
 
 @pytest.fixture
 def network() -> tuple[Network, InMemory]:
     link = InMemory()
-    return Network(link, height_m=0.36), link
+    return Network(link), link
 
 
 def said(kind: str, **fields) -> Taken:
@@ -29,6 +44,10 @@ def said(kind: str, **fields) -> Taken:
 def twist(v: float, omega: float = 0.0) -> Taken:
     kind = "geometry_msgs/msg/Twist"
     return said(kind, linear={"x": v}, angular={"z": omega})
+
+
+def stamped(v: float) -> Taken:
+    return said("geometry_msgs/msg/TwistStamped", twist={"linear": {"x": v}})
 
 
 def word(text: str) -> Taken:
@@ -49,6 +68,8 @@ def test_messages_are_what_a_page_may_ask_for(network):
         MoveDoor(opened=False, name="door:1"),
     ]  # fmt: skip
     assert network.refused() is None
+    link.come[TAKES[1][0]] = [stamped(0.2)]
+    assert list(network.requests()) == [Drive(v=0.2, omega=0.0)]
 
 
 @pytest.mark.parametrize(
@@ -79,3 +100,58 @@ def test_a_twist_moves_the_robot(network):
             hands.do(request)
         after = next(moments).frame.truth
     assert np.hypot(*(after - before)[:2]) > 0.1
+
+
+def log(folder: Path) -> Path:
+    """A log of 12 scans, five a second, with the times of its year."""
+    path = folder / "made.log"
+    path.write_text(carmen(12))
+    return path
+
+
+def bag(folder: Path) -> Path:
+    """A bag of 40 scans."""
+    with BagWriter(folder / "bag", SPEC, labels=False) as out:
+        for frame in driven(40):
+            out.write(Moment(frame=frame, poses=np.empty((0, 3)), moving=np.empty(0, bool)))
+    return folder / "bag"
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("recorded", [log, bag])
+@pytest.mark.parametrize("middleware", MIDDLEWARES)
+def test_a_node_hears_every_scan_of_a_log_and_of_a_bag(middleware, recorded, tmp_path):
+    pytest.importorskip("viser")
+    pytest.importorskip({"dds": "cyclonedds", "zenoh": "zenoh"}[middleware])
+    from scripts.live.view import View
+
+    domain = Domain(middleware, own=True, wait_s=10.0)
+    links = [open_link(middleware, domain=domain.number, router=domain.router) for _ in range(3)]
+    own, other, third = links
+    view = View(Opener(slams=["odometry"], path=recorded(tmp_path)), ("127.0.0.1", 0),
+                network=Network(own))  # fmt: skip
+    node, over = Served(other, create("odometry")), threading.Event()
+
+    def serve() -> None:
+        while not over.is_set():
+            node.turn()
+
+    thread, said = threading.Thread(target=serve), replace(TF, depth=1000)
+    with closing(view), closing(third):
+        third.subscribe(said)
+        time.sleep(1.0)  # all have found each other
+        thread.start()
+        shown, answered, end_s = set(), set(), time.monotonic() + 20.0
+        while not view.playback.ended:
+            view.turn()
+            shown.add(said_ns(view.playback.present.frame.stamp_ns))
+        while answered != shown and time.monotonic() < end_s:
+            third.wait(0.1)
+            found = (decoded(TF.kind, taken.data) for taken in third.take(said))
+            links = (transform_of(message, "map", "odom") for message in found)
+            answered |= {link.stamp_ns for link in links if link is not None}
+        over.set()
+        thread.join()
+        other.close()
+    domain.free()
+    assert answered == shown

@@ -8,10 +8,8 @@ from typing import Any
 
 import pytest
 
-from scripts.live.inbox import MOST_WAITING, Inbox
-from scripts.live.pace import Pace
-from scripts.live.playback import KEPT_S, Playback
-from scripts.live.requests import Run, Seek, Step
+from scripts.live.playback import KEPT_S, Pace, Playback
+from scripts.live.requests import MOST_WAITING, Inbox, Run, Seek, Step
 from slam.errors import InvalidValueError, SlamFailedError
 
 

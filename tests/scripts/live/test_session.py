@@ -10,8 +10,8 @@ import numpy as np
 import pytest
 
 from scripts.live.hands import Hands
-from scripts.live.opened import Opener
 from scripts.live.requests import Anew, Click, Drive
+from scripts.live.session import Opener
 from sim.moments import toured
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe

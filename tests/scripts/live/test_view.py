@@ -17,8 +17,8 @@ import pytest
 from PIL import Image
 
 from scripts.live import gate, served
-from scripts.live.opened import Opener
 from scripts.live.replay import Recorder
+from scripts.live.session import Opener
 from scripts.live.view import View
 from sim.view.moment import Moments
 from slam.errors import InvalidValueError, MissingDependencyError

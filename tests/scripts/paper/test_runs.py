@@ -10,9 +10,7 @@ import numpy as np
 import pytest
 
 from scripts.jobs import _digest, run_jobs
-from scripts.output import write_recipe
 from scripts.paper import park_runs, point_runs, rooms
-from scripts.paper.report import total
 from scripts.paper.runs import Plan, depends_on, job, load_run, save_run, sign_test, spread
 from slam.errors import InvalidValueError
 
@@ -55,24 +53,13 @@ def test_a_run_depends_on_what_makes_it_and_not_on_pages():
         )
 
 
-def test_time_is_told_of_all_whenever_it_was_spent(tmp_path):
-    for name, cpu_s, page in (("office", 4000.0, 40.0), ("theory", 200.0, 200.0)):
-        write_recipe(tmp_path / name, name, {"cpu_s": cpu_s, "page_cpu_s": page})
-    told = total(Plan(out=tmp_path), ["office", "theory"], 13.0)
-    assert "processor time 70 min, that is 37 min on 2 cores; wall time of this call 13 s" in told
-    assert told.endswith("met.")
-    write_recipe(tmp_path / "office", "office", {"cpu_s": 9000.0, "page_cpu_s": 40.0})
-    assert total(Plan(out=tmp_path), ["office", "theory"], 13.0).endswith("**missed.**")
-
-
-def test_runs_come_back_as_they_were_with_their_processor_time(tmp_path):
+def test_runs_come_back_as_they_were(tmp_path):
     (made,) = run_jobs([job("a", a_run, seed=7, data=str(tmp_path))], tmp_path).values()
     run = load_run(made)
     assert run.numbers["seed"] == 7
     assert math.isnan(run.numbers["θ"])
     assert list(run.arrays) == ["poses"]
     np.testing.assert_array_equal(run.arrays["poses"], np.eye(3))
-    assert 0.0 <= run.cpu_s < 10.0
 
 
 def test_medians_and_sign_tests():

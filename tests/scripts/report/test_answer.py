@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from typing import Any
 
 import pytest
@@ -115,6 +116,14 @@ def of(lost: list[int], *, runs: int = 10, levels=(0.0, 0.4, 1.0), failures=(), 
 )  # fmt: skip
 def test_the_sentence_of_each_case(case: Standing, said: str):
     assert answer(case) == f"`{MINE}` {said}"
+
+
+def test_people_are_named_where_they_are_what_is_varied():
+    case = replace(of([0, 0, 10], levels=(0.0, 8.0, 12.0)), axis="people", scene="intel.toml")
+    said = "it holds at 8 and is lost from 12 people on in intel.toml, so at least 72 %"
+    assert said in answer(case)
+    lost = replace(of([10, 10], levels=(0.0, 4.0)), axis="people")
+    assert "already at 0 people" in answer(lost)
 
 
 @pytest.mark.parametrize("runs", [1, 2, 3, 5, 10, 40])

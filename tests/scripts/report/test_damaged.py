@@ -4,10 +4,7 @@
 from __future__ import annotations
 
 import json
-import random
-import resource
 import shutil
-from collections import Counter
 from pathlib import Path
 from typing import Any
 
@@ -18,14 +15,12 @@ from scripts import results
 from scripts.closed_loop.folder import driven
 from scripts.comparison.folder import read, write_table
 from scripts.comparison.plan import Plan
-from scripts.report import page, pictures
+from scripts.report import pictures
 from scripts.report.study import study
-from sim.recording.sums import SUMS, write_sums
+from sim.recording.sums import write_sums
 from slam.errors import InvalidValueError, LogFormatError
-from tests.scripts.report import made, mutations
+from tests.scripts.report import made
 
-CASES, DRAWN = 200, 4
-MOST_BYTES = 48 << 20  # by which the process may grow; the folder has 100 kB
 # What ``verify`` wants to be there, and no report reads.
 UNREAD = (
     "runs.json", "drive/runs.csv", "drive/runs.json", "drive/goals.csv", "drive/closed_loop.png",
@@ -79,11 +74,6 @@ def refusal(folder: Path) -> str:
 def test_what_is_whole_is_read_and_called_well(folder: Path):
     assert refusal(folder) == ""
     assert well(folder)
-
-
-def peak_bytes() -> int:
-    """The most memory that this process has held so far."""
-    return resource.getrusage(resource.RUSAGE_SELF).ru_maxrss * 1024
 
 
 def array(name: str, value: Any):
@@ -177,35 +167,3 @@ def test_what_cannot_be_read_is_not_written(tmp_path: Path):
     with pytest.raises(InvalidValueError, match=r"Plan\.seeds must be a list of one or more"):
         Plan(slams=("ekf",), scenes=("arena",), levels=(0.0,), seeds=(10**30,))
     assert not (tmp_path / "runs.csv").exists()
-
-
-def test_whatever_is_harmed_is_read_or_refused_in_a_line(whole: Path, folder: Path):
-    """200 harms: no traceback, no memory that the folder does not have, and ``verify`` agrees."""
-    ended: Counter[bool] = Counter()
-    before = peak_bytes()
-    for case in range(CASES):
-        path, how = mutations.mutate(folder, random.Random(case))
-        said = refusal(folder)
-        if case % 8 == 0:  # it reads all once more
-            assert well(folder) == (said == ""), (how, said)
-            for sums in folder.rglob(SUMS):
-                sums.unlink()
-        shutil.copyfile(whole / path.relative_to(folder), path)
-        assert peak_bytes() - before < MOST_BYTES, how
-        ended[said == ""] += 1
-    assert min(ended.values()) > CASES // 10, ended  # it tries what is refused and what is not
-
-
-@pytest.mark.parametrize("first", range(DRAWN))
-def test_whatever_is_read_is_drawn(whole: Path, tmp_path: Path, first: int, monkeypatch):
-    """A harm that is no fault, or none that the schema knows, has a page."""
-    monkeypatch.setattr(pictures, "MOMENTS", 2)
-    draw = random.Random(1000 + first)
-    while True:
-        folder = tmp_path / "harmed"
-        shutil.rmtree(folder, ignore_errors=True)
-        shutil.copytree(whole, folder)
-        mutations.mutate(folder, draw)
-        if refusal(folder) == "":
-            break
-    assert page.render(study(folder), [driven(folder / "drive")]).rstrip().endswith("</html>")

@@ -365,15 +365,11 @@ def other_folder(tmp_path: Path, kind: str) -> Path:
 @pytest.mark.parametrize(
     ("kind", "says"),
     [
-        ("run", "is of mobilia run. A report is about a comparison: mobilia compare --slam"),
-        ("demo", "is of mobilia demo"),
+        ("run", "is of mobilia run: a report is about a comparison, mobilia compare --slam"),
         ("dataset", "is a dataset of mobilia generate"),
         ("episode", "is an episode of mobilia generate"),
         ("drive", "mobilia report COMPARISON --drive"),
         ("benchmark", "index.html there is its page"),
-        ("days", "days.csv has its scores"),
-        ("lifelong", "index.html there is its page"),
-        ("blame", "index.html there is its page"),
         ("compare", "is unfinished: the same mobilia compare again goes on"),
         ("empty", "holds no comparison: mobilia compare --slam A B --out DIR"),
     ],

@@ -17,8 +17,6 @@ from scripts import results
 from scripts.film.footage import open_run
 from scripts.output import locked_folder, together, whole_folder, write_recipe
 from scripts.report.page import REPORT
-from scripts.robustness.damage import Tally, damaged, damages, try_consumers, try_verify
-from scripts.robustness.samples import COMPARED, SAMPLES
 from scripts.verbs.verify import verify
 from sim.recording.dataset import Plan, read_plan, writing
 from sim.recording.episode import record
@@ -27,18 +25,26 @@ from sim.recording.sums import SUMS, add_to_sums, check_vouched, read_sums, writ
 from sim.recording.verify import METADATA, STATUS, Finding, check_bag
 from slam import locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
+from tests.scripts.robustness.samples import (
+    COMPARED,
+    damaged,
+    damages,
+    made,
+    misread,
+    missed_by_verify,
+)
 
 EPISODES = ["arena-d0.5-s0000", "arena-d0.5-s0001"]
 
 
 @pytest.fixture(scope="module")
 def dataset(tmp_path_factory) -> Path:
-    return SAMPLES["dataset"](tmp_path_factory.mktemp("made") / "data")
+    return made("dataset", tmp_path_factory.mktemp("made") / "data")
 
 
 @pytest.fixture(scope="module")
 def comparison(tmp_path_factory) -> Path:
-    return SAMPLES["comparison"](tmp_path_factory.mktemp("made") / "compared")
+    return made("comparison", tmp_path_factory.mktemp("made") / "compared")
 
 
 @pytest.fixture
@@ -59,29 +65,23 @@ def status(path: Path) -> int:
 
 
 def test_every_damage_of_a_dataset_is_noticed(dataset):
-    tally = Tally()
-    try_verify(tally, "dataset", dataset, 60, seed=1)
-    assert (tally.wrong, tally.counts.total()) == ([], 60)
+    assert missed_by_verify("dataset", dataset, 60, seed=1) == []
 
 
 @pytest.mark.parametrize("name", ["map", "raster", "drive"])
 def test_every_damage_of_other_results_is_noticed(name, tmp_path):
-    tally = Tally()
-    folder = SAMPLES[name](tmp_path / name)
-    try_verify(tally, name, folder, 21, seed=2)
-    try_consumers(tally, name, folder, 3, seed=3)
-    assert tally.wrong == []
+    folder = made(name, tmp_path / name)
+    assert missed_by_verify(name, folder, 21, seed=2) == []
+    assert misread(name, folder, 3, seed=3) == []
 
 
 def test_every_damage_of_a_comparison_is_noticed_or_made_good(comparison):
-    tally = Tally()
-    try_verify(tally, "comparison", comparison, 24, seed=4)
-    try_consumers(tally, "comparison", comparison, 3, seed=5)
-    assert tally.wrong == []
+    assert missed_by_verify("comparison", comparison, 24, seed=4) == []
+    assert misread("comparison", comparison, 3, seed=5) == []
 
 
 def test_damages_are_the_same_for_the_same_seed_and_leave_the_folder_as_it_was(copied, dataset):
-    assert damages(copied, 9, seed=5) == damages(dataset, 9, seed=5)
+    assert [*damages(copied, 9, seed=5)] == [*damages(dataset, 9, seed=5)]
     for damage in damages(dataset, 12, seed=6):
         with damaged(copied, dataset, damage):
             assert verdicts(copied)
@@ -356,7 +356,7 @@ def test_a_folder_of_nothing_of_ours_is_refused(tmp_path):
 
 
 def test_a_map_is_called_well_when_it_or_its_folder_has_its_hashes(tmp_path):
-    folder = SAMPLES["raster"](tmp_path / "raster")
+    folder = made("raster", tmp_path / "raster")
     assert status(folder / "map.yaml") == status(folder / "map.pgm") == 0
     write_sums(folder)
     assert status(folder / "map.yaml") == 0

@@ -11,7 +11,7 @@ from types import SimpleNamespace
 
 import pytest
 
-from scripts.doctor import checks, sizes
+from scripts.doctor import checks
 from sim.view import gl
 
 
@@ -83,15 +83,11 @@ def test_the_command_ends_with_1_where_something_needed_is_missing(called, insta
     assert done.stderr == "mobilia: needed and missing: numba\n"
 
 
-def test_sizes_are_those_of_the_files_and_each_package_has_a_reason(called):
-    found = {size.name: size for size in sizes.sizes()}
-    files = metadata.files("rosbags") or ()
+def test_sizes_are_those_of_the_files(called):
+    files = metadata.files("llvmlite") or ()
     ours = sum(os.lstat(f.locate()).st_size for f in files if os.path.lexists(f.locate()))
-    assert found["rosbags"].megabytes == pytest.approx(ours / 1e6)
-    assert found["llvmlite"].group == found["lz4"].group == sizes.DEMO  # lz4: rosbags needs it
-    assert found["pytest"].group == sizes.OTHER
     done = called("doctor", "--sizes")
     assert done.returncode == 0
-    assert "llvmlite" in done.stdout
-    whole = sum(size.megabytes for size in found.values())
-    assert f"{whole:.0f} MB in all: mobilia " in done.stdout
+    (row,) = (line for line in done.stdout.splitlines() if "llvmlite" in line)
+    assert f" {ours / 1e6:.0f} " in row
+    assert "MB in all" in done.stdout

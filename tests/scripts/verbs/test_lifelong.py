@@ -89,5 +89,5 @@ def test_a_small_building_is_lived_in(called, tmp_path):
         p.name for p in out.iterdir()
     }
     page = (out / "index.html").read_text()
-    assert "every session starts anew" in page
+    assert "starts anew: cannot load a map" in page
     assert "Session 1: " in page

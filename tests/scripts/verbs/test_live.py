@@ -9,7 +9,7 @@ from types import SimpleNamespace
 import pytest
 
 from scripts.live import view
-from scripts.live.opened import Opener
+from scripts.live.session import Opener
 from scripts.verbs.live import _serve
 from slam.errors import InvalidValueError
 

@@ -64,11 +64,8 @@ def test_a_described_log_runs_with_one_warning_and_says_what_it_cost(rover, tmp_
     assert "of SLAM" in said
     results = json.loads((out / "results.json").read_text())
     cost = results["cost"]
-    assert set(cost) == {"slam_s", "pictures_s", "input_s", "memory_mb", "stages"}
-    assert set(cost["stages"]) == {"input", "slam", "map", "pictures", "rest"}  # no film
-    parts = sum(cost["stages"][name]["s"] for name in ("map", "pictures", "rest"))
-    assert cost["pictures_s"] == pytest.approx(parts, abs=0.1)
-    assert max(stage["memory_mb"] for stage in cost["stages"].values()) == cost["memory_mb"]
+    assert set(cost) == {"slam_s", "rest_s", "memory_mb"}
+    assert cost["memory_mb"] > 50
     recipe = json.loads((out / "recipe.json").read_text())
     assert recipe["settings"]["log_facts"]["torn_last_line"] == 1
     assert not (out / "film.mp4").exists()

@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import json
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -20,14 +21,19 @@ FRAMES = driven(60)
 HOUR_NS = 3600 * 10**9
 
 
-@pytest.fixture(scope="module")
-def ours(tmp_path_factory) -> Path:
-    """A bag of ours: scans, perfect odometry, truth."""
-    path = tmp_path_factory.mktemp("ours") / "bag"
+def written(path: Path, *, truth: bool) -> Path:
+    """A bag of ours: scans, perfect odometry, truth or none."""
     with BagWriter(path, SPEC, labels=False) as bag:
         for frame in FRAMES:
-            bag.write(Moment(frame=frame, poses=np.empty((0, 3)), moving=np.empty(0, bool)))
+            shown = frame if truth else replace(frame, truth=None)
+            bag.write(Moment(frame=shown, poses=np.empty((0, 3)), moving=np.empty(0, bool)))
     return path
+
+
+@pytest.fixture(scope="module")
+def ours(tmp_path_factory) -> Path:
+    """A bag with truth."""
+    return written(tmp_path_factory.mktemp("ours") / "bag", truth=True)
 
 
 def stack(path: Path, offset_ns: int = 0) -> Path:
@@ -45,7 +51,10 @@ def stack(path: Path, offset_ns: int = 0) -> Path:
 def test_a_stack_is_scored_as_a_slam_is(called, ours, tmp_path):
     ended = called("score", stack(tmp_path / "said"), "--on", ours, "--out", tmp_path / "out")
     assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "`recorded` was off by" in ended.stdout
+    assert (tmp_path / "out" / "index.html").exists()
     slams = json.loads((tmp_path / "out" / "results.json").read_text())["slams"]
+    assert "ms_per_scan_p50" not in slams["recorded"]  # a bag does not say it
     errors = {name: block["end_error_m"] for name, block in slams.items()}
     assert errors["recorded"] == pytest.approx(0.059, abs=1e-3)
     assert errors["odometry"] == pytest.approx(0.0, abs=1e-6)
@@ -64,3 +73,36 @@ def test_a_bag_without_statements_lists_its_topics(called, ours, tmp_path):
     ended = called("score", ours, "--pose", "/amcl_pose", "--out", tmp_path / "out")
     assert ended.returncode == 1
     assert "no pose on /amcl_pose" in ended.stdout + ended.stderr
+
+
+def test_without_truth_what_can_be_said_is_said(called, tmp_path):
+    bag = written(tmp_path / "blind", truth=False)
+    said = stack(tmp_path / "said")
+    ended = called("score", said, "--on", bag, "--out", tmp_path / "out")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    assert "`recorded` ran through 60 scans; without truth, no errors." in ended.stdout
+
+
+@pytest.mark.parametrize(
+    ("spoil", "says"),
+    [
+        (lambda said: ("--map-frame", "world"), "no world -> odom on /tf; topics: /tf"),
+        (lambda said: ("--clock-offset", "nan"), "--clock-offset must be a number, got nan"),
+        (lambda said: torn(said), "said: corrupt or truncated bag"),
+        (lambda said: ("--on", said), "said: no message of type sensor_msgs/msg/LaserScan"),
+    ],
+)
+def test_wrong_input_is_one_line(called, ours, tmp_path, spoil, says):
+    said = stack(tmp_path / "said")
+    ended = called("score", said, "--on", ours, *spoil(said), "--out", tmp_path / "out")
+    assert ended.returncode in (1, 2)
+    assert says in ended.stderr
+    assert len(ended.stderr.splitlines()) == 1
+    assert not (tmp_path / "out").exists()
+
+
+def torn(bag: Path) -> tuple[()]:
+    """Half of it is gone."""
+    (file,) = bag.glob("*.mcap")
+    file.write_bytes(file.read_bytes()[: file.stat().st_size // 2])
+    return ()

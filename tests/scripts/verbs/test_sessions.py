@@ -12,8 +12,8 @@ import pytest
 from scripts.verbs.generate import generate
 from sim.recording.dataset import Plan, check_dataset, read_plan
 from sim.recording.days import CHANGES, FILES, read_things
-from sim.recording.rearranged import COLUMNS, REARRANGED
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
+from sim.recording.tables import COLUMNS, REARRANGED
 from sim.recording.verify import check_hashes, regenerate
 from slam.errors import InvalidValueError, LogFormatError
 from slam.logs.bag_topics import Bag

@@ -105,18 +105,13 @@ def test_the_physics_has_nothing_to_warn_of(walk):
     assert np.isfinite(walk["world"].data.qpos).all()
 
 
-def test_a_swinging_leg_is_a_moving_body():
+def test_who_has_a_foot_in_the_air_moves():
     world = World("office", seed=2, dynamism=Dynamism.world_1(1.0))
     for _ in range(8 * SUBSTEPS_PER_S):
         world.substep()
-    moving = world.moving_bodies()
-    for i, row in enumerate(_rows(world, "person")):
-        name = world.people.names[i]
-        for body in ("base", "shank_l", "thigh_r"):
-            assert moving[world.model.body(f"{name}/{body}").id] == world.movers_moving()[row]
-        if world.people.swinging()[i]:
-            assert world.movers_moving()[row]
-    assert not moving[0]
+    swinging = world.people.swinging()
+    assert swinging.any()
+    assert world.movers_moving()[_rows(world, "person")][swinging].all()
 
 
 def _door_angle(world: World, door: str) -> float:

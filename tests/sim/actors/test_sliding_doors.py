@@ -17,7 +17,7 @@ from scenes.scene import Scene
 from sim.actors.config import ACTORS
 from sim.core.dynamism import Dynamism
 from sim.driving.pilot import Pilot
-from sim.recording.objects import ObjectsMessage
+from sim.recording.topics import ObjectsMessage
 from sim.simulation import Simulation
 from sim.twins.absence import Change, apply
 from sim.view.mapview import MapView

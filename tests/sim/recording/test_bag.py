@@ -18,7 +18,7 @@ from mcap_ros2.decoder import DecoderFactory
 from scenes.kinds import kind_of
 from sim.moments import Moment
 from sim.recording.bag import BagWriter
-from sim.recording.relations import pairs
+from sim.recording.tables import pairs
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam import se2
 from slam.errors import InvalidValueError

@@ -10,14 +10,15 @@ import pytest
 
 from sim.actors.rearranging import FAR_M, Rearrangement
 from sim.recording.days import THING_COLUMNS, THINGS, Thing, read_things
-from sim.recording.rearranged import (
+from sim.recording.tables import (
     COLUMNS,
     REARRANGED,
     Rearranged,
+    pose_words,
     read_rearranged,
+    table,
     write_rearranged,
 )
-from sim.recording.tables import pose_words, table
 from slam.errors import LogFormatError
 
 BOUNDS = (0.0, 0.0, 8.0, 6.0)

@@ -20,12 +20,13 @@ Float = NDArray[np.float64]
 
 
 def drive(twists: Float, rate: float = 75.0) -> tuple[Float, Float]:
-    """((n + 1, 2) rim travel m, (n + 1, 3) true poses) of (n, 2) v m/s, omega rad/s."""
-    travel, poses = [np.zeros(2)], [np.zeros(3)]
-    for v, omega in twists:
-        half = 0.5 * omega * TRACK
-        travel.append(travel[-1] + np.array([v - half, v + half]) / rate)
-        poses.append(se2.compose(poses[-1], se2.exp((v, 0.0, omega), 1.0 / rate)))
+    """((n + 1, 3) travel m, (n + 1, 3) true poses) of v m/s, omega rad/s and, if it is there, m/s
+    to the left."""
+    travel, poses = [np.zeros(3)], [np.zeros(3)]
+    for v, omega, *aside in twists:
+        half, side = 0.5 * omega * TRACK, aside[0] if aside else 0.0
+        travel.append(travel[-1] + np.array([v - half, v + half, side]) / rate)
+        poses.append(se2.compose(poses[-1], se2.exp((v, side, omega), 1.0 / rate)))
     return np.array(travel), np.array(poses)
 
 
@@ -118,11 +119,22 @@ def test_covariance_matches_sampling_of_both_parts() -> None:
         for rims in travel[::10]:
             odometry.update(rims)
         ends.append(odometry.pose - np.array([*poses[-1][:2], 0.3 * 4.0]))
-        reading = scan(odometry, travel[-1], travel[-1] + 1e-3, stamp_ns=0, sweep_s=0.02)
+        last = travel[-1] + [1e-3, 1e-3, 0.0]
+        reading = scan(odometry, travel[-1], last, stamp_ns=0, sweep_s=0.02)
         claimed = np.array(reading.increment_covariance)
     sampled = np.cov(np.array(ends).T)
     assert np.abs(sampled - claimed).max() < 0.12 * claimed.max()
     np.testing.assert_allclose(np.sqrt(np.diag(sampled)), np.sqrt(np.diag(claimed)), rtol=0.08)
+
+
+def test_wheels_that_roll_sideways_tell_the_true_path_and_err_along_it() -> None:
+    travel, poses = drive(np.tile((0.3, 0.8, -0.4), (200, 1)))
+    np.testing.assert_allclose(run("ideal", travel, seed=0).pose, poses[-1], atol=1e-9)
+    config = OdometryConfig(trans_std_per_m=0.02)
+    aside = np.column_stack([np.zeros((81, 2)), np.linspace(0.0, 1.0, 81)])
+    ends = np.array([run(config, aside, seed).pose for seed in range(400)])
+    assert ends[:, 1].std() == pytest.approx(0.02, rel=0.12)
+    assert ends[:, 0].std() < 1e-9
 
 
 def test_deviation_after_one_metre_does_not_depend_on_the_rate() -> None:
@@ -212,7 +224,7 @@ def test_the_seed_and_only_the_seed_decides_a_run_and_draws_are_fixed() -> None:
 def test_a_standing_robot_has_an_invertible_covariance_and_does_not_drift() -> None:
     odometry = WheelOdometry("pioneer3dx", np.random.default_rng(1))
     for k in range(3):
-        reading = scan(odometry, (0.0, 0.0), (0.0, 0.0), stamp_ns=k, sweep_s=0.02)
+        reading = scan(odometry, np.zeros(3), np.zeros(3), stamp_ns=k, sweep_s=0.02)
     np.testing.assert_array_equal(reading.T_odom_robot, np.zeros(3))
     assert np.linalg.det(reading.increment_covariance) > 0.0
 

@@ -88,7 +88,7 @@ def test_a_room_without_a_free_path_is_refused():
 def test_wheels_roll_along_a_path_without_slip():
     angle = np.linspace(0.0, math.pi, 200)
     circle = np.column_stack([np.sin(angle), 1.0 - np.cos(angle), angle])
-    left, right = rolled(circle, 0.33)[-1]
+    left, right, _ = rolled(circle, 0.33)[-1]
     assert 0.5 * (left + right) == pytest.approx(math.pi, rel=1e-4)
     assert right - left == pytest.approx(0.33 * math.pi, rel=1e-9)
 

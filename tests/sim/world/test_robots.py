@@ -11,6 +11,7 @@ import pytest
 
 from sim.simulation import Simulation, tour
 from sim.world.robots import names, read_robot, robot_of
+from slam import se2
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
 
@@ -42,6 +43,28 @@ def test_a_small_robot_keeps_its_own_pace_and_clearance() -> None:
     assert np.hypot(*(poses[-1] - poses[0])[:2]) < 0.22 * 3.0
     row = simulation.world.bodies.robot
     assert simulation.world.bodies.radius[row] == pytest.approx(0.1126 + 0.032, abs=1e-3)
+
+
+def test_wheels_that_roll_sideways_go_where_they_are_asked_to() -> None:
+    simulation = Simulation(
+        "arena", seed=4, dynamism=0.0, robot="rosbot_xl", odometry="ideal", n_chairs=0, crowd="none"
+    )
+    start, asked = simulation.world.robot_pose().copy(), (0.2, 0.5, -0.3)
+    simulation.world.set_command(*asked)
+    frames = [simulation.observe() for _ in range(60)]
+    ended, seconds = frames[-1], (frames[-1].stamp_ns - frames[30].stamp_ns) / 1e9
+    step = se2.between(frames[30].truth, ended.truth)
+    wanted = se2.exp((asked[0], asked[2], asked[1]), seconds)  # once the ramp is over
+    np.testing.assert_allclose(step, wanted, atol=0.01)
+    told = se2.between(frames[30].odometry.T_odom_robot, ended.odometry.T_odom_robot)
+    np.testing.assert_allclose(told, step, atol=0.01)  # x ahead, y left, as SLAMs take it
+    assert ended.odometry.twist[1] == pytest.approx(-0.3, abs=0.01)
+    assert not np.allclose(start, simulation.world.robot_pose())
+
+
+def test_a_robot_that_cannot_drive_sideways_says_so() -> None:
+    with pytest.raises(InvalidValueError, match="cannot drive sideways"):
+        Simulation("arena", seed=4, dynamism=0.0).world.set_command(0.1, 0.0, 0.2)
 
 
 @pytest.mark.parametrize(

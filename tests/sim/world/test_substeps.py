@@ -57,7 +57,7 @@ def test_many_substeps_at_once_are_single_ones():
         for k in range(8):
             worlds[1].substep()
             np.testing.assert_array_equal(path[k + 1], worlds[1].robot_pose())
-            np.testing.assert_array_equal(travel[k + 1], worlds[1].wheel_angles())
+            np.testing.assert_array_equal(travel[k + 1, :2], worlds[1].wheel_angles())
         for world, names in zip(worlds, touched, strict=True):
             names += [str(contact) for contact in world.take_contacts()]
     assert touched[0] == touched[1] != []

@@ -146,7 +146,7 @@ def test_a_chair_rolls_as_far_as_friction_says_and_sleeps():
     way = mass / damping * (v - friction / damping * math.log1p(damping * v / friction))
     assert world.data.qpos[qpos] - start == pytest.approx(way, rel=0.03)
     assert world.data.qvel[dof] == 0.0
-    assert not world.moving_bodies()[world.model.body("chair0/base").id]
+    assert not world.movers_moving().any()
 
 
 @pytest.mark.parametrize("speed", [0.4, 1.2])
@@ -215,7 +215,7 @@ def test_a_wall_stops_the_robot_and_its_wheels_slip():
     world = empty()
     world.set_command(0.8, 0.0)
     run(world, 20.0)
-    assert -0.05 < world.robot_clearance() < 0.05
+    assert -0.05 < world.bodies.clearance(world.data) < 0.05
     touched = world.take_contacts()
     assert touched[0].kind == "static"
     assert touched[0].hard

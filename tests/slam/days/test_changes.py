@@ -9,10 +9,9 @@ import numpy as np
 import pytest
 
 from slam.days.changes import between
-from slam.days.config import EvidenceConfig
 from slam.days.evidence import SessionGrid, Snapshot
+from slam.days.habits import MobilityMap
 from slam.days.history import History
-from slam.days.mobility import MobilityMap
 from slam.errors import InvalidValueError
 from tests.world2d import Drive, World2D, frames, rectangle
 
@@ -114,7 +113,7 @@ def test_what_only_one_session_saw_has_not_changed():
 
 def test_a_session_sees_walls_standing_floor_empty_and_nothing_behind():
     world = World2D(np.vstack([rectangle(-2.0, -2.0, 4.0, 2.0), rectangle(2.0, -0.4, 2.6, 0.4)]))
-    grid = SessionGrid(EvidenceConfig())
+    grid = SessionGrid()
     for frame in frames(world, Drive((0.0, 0.0, 0.0), ((0.1, 0.0, 4.0),)), rate_hz=5.0, seed=1):
         grid.add(frame, frame.truth)
     assert grid.scans == 21

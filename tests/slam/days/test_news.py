@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from slam.days.evidence import SessionGrid
-from slam.days.history import History
-from slam.days.news import News
+from slam.days.history import History, News
 from tests.world2d import Drive, World2D, frames, rectangle
 
 WALLS = rectangle(-3.0, -2.5, 4.0, 2.5)

@@ -12,8 +12,16 @@ from scipy import integrate
 
 from slam.days.habits import TEMPOS, Habits, near_hours, relaxed
 from slam.days.history import DAY_S
-from slam.days.predictions import HOUR_S, brier, log_score
-from slam.days.rivals import FreMEn, LastSeen, Mean, PersistenceFilter, lasting
+from slam.days.predictions import (
+    HOUR_S,
+    FreMEn,
+    LastSeen,
+    Mean,
+    PersistenceFilter,
+    brier,
+    lasting,
+    log_score,
+)
 from slam.errors import InvalidValueError
 
 ALL = (Habits, LastSeen, Mean, PersistenceFilter, FreMEn)
@@ -68,7 +76,7 @@ def test_the_persistence_filter_agrees_with_the_sum_over_all_ends():
     filter_ = PersistenceFilter(1, missed=missed, false=false)
     for hours, value in ((0.0, 1.0), (2.0, 1.0), (5.0, 0.0)):
         filter_.see(hours * HOUR_S, np.array([value]))
-    survived = lasting(np.array([0.0, 2.0, 5.0]) * HOUR_S, *filter_.prior)
+    survived = lasting(np.array([0.0, 2.0, 5.0]) * HOUR_S, HOUR_S, 30.0 * DAY_S)
     survived[0] = 1.0
     hit, none = 1.0 - missed, missed
     ends = hit * false * (1.0 - false) * (survived[0] - survived[1]) + hit * hit * (1.0 - false) * (

@@ -9,10 +9,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slam.days.config import AgreementConfig, DaysConfig
 from slam.days.evidence import Snapshot
+from slam.days.habits import DaysRaster
 from slam.days.history import DAY_S, History
-from slam.days.mobility import DaysRaster
+from slam.days.search import FITS, SPOILS
 from slam.days.session import Session, keep, read_history
 from slam.errors import InvalidValueError, LogFormatError
 from slam.shunting import ShuntingConfig, ShuntingSlam
@@ -139,8 +139,8 @@ def test_a_start_that_the_days_before_deny_is_not_found(first) -> None:
 def test_a_session_that_the_days_before_deny_lies_apart(first) -> None:
     """Though it was tracked in the map."""
     state = other_days(first, found=True).state
-    assert state.tracked > DaysConfig().search.fits
-    assert state.disagrees > AgreementConfig().spoils
+    assert state.tracked > FITS
+    assert state.disagrees > SPOILS
     assert not state.fits
 
 

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from slam.ekf.config import EkfConfig
-from slam.ekf.lifecycle import Lifecycle, in_view, unhidden_by_beams, unhidden_by_features
+from slam.ekf.slam import Lifecycle, in_view, unhidden_by_beams, unhidden_by_features
 from slam.errors import InvalidValueError
 from slam.frames import LaserSpec, Scan
 

@@ -99,7 +99,7 @@ def test_corners_of_an_arena_are_enough():
     errors, _ = run(system, frames[:101])
     assert system.config == EkfConfig.corners()
     assert rmse(errors) < 0.06
-    ellipses = system.landmarks().ellipses(3.0)
+    ellipses = system.landmarks().ellipses()
     assert ellipses.shape == (len(system.landmarks().keys), 5)
     assert np.all(ellipses[:, 2] >= ellipses[:, 3])
     assert np.all(ellipses[:, 3] > 0.0)
@@ -163,7 +163,7 @@ def test_ellipses_are_those_of_the_covariance():
     features = Features(stamp_ns=0, points_robot=[[2.0, 1.0]], covariances=[0.5 * (C + C.T)])
     system.update(Frame(stamp_ns=0, odometry=odometry, features=features))
     scale = 3.0 * system.config.noise_scale
-    ((x, y, major, minor, angle),) = system.landmarks().ellipses(3.0)
+    ((x, y, major, minor, angle),) = system.landmarks().ellipses()
     np.testing.assert_allclose([x, y, major, minor], [2.0, 1.0, 0.2 * scale, 0.1 * scale])
     assert math.isclose(math.sin(angle - 0.5), 0.0, abs_tol=1e-9)
 

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from slam.errors import InvalidValueError
-from slam.evaluation.beside import beside
-from slam.evaluation.evidence import evidence_of
+from slam.evaluation.evidence import beside, evidence_of
 from slam.frames import Frame, LaserSpec, Odometry, Scan
 
 SPEC = LaserSpec(n_beams=91, angle_min=-math.pi / 4, angle_increment=math.pi / 180)

@@ -13,11 +13,8 @@ import numpy as np
 import pytest
 
 from slam import se2
-from slam.errors import InvalidValueError
 from slam.frames import Features, LaserSpec, Scan
-from slam.frontend import corner_image
-from slam.frontend.corner_config import CornerConfig
-from slam.frontend.corners import answered, corners
+from slam.frontend.corners import IDEAL, answered, corners, draw, refine
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import world2d
@@ -64,10 +61,10 @@ def test_meeting_lines_and_dots_are_found_within_a_tenth_of_a_cell(angle_deg, sh
     arms = 30.0 * np.array([[1.0, 0.0], [0.0, 0.0], [c, s]])
     points = np.vstack([corner + arms, [15.0, 15.0]])
     drawn, joined = np.ones(4, dtype=bool), np.array([True, True, False, False])
-    corner_image.draw(image, widths, points, np.full(4, 1.2), drawn, joined)
+    draw(image, widths, points, np.full(4, 1.2), drawn, joined)
     for start, truth, within in ((corner, corner, 0.25), (points[3], points[3], 0.02)):
         column, row = np.round(start + 1.0).astype(int)
-        x, y, covariance, found = corner_image.refine(image, widths, int(column), int(row), 4)
+        x, y, covariance, found = refine(image, widths, int(column), int(row))
         assert found
         np.testing.assert_allclose([x, y], truth, atol=within)
         assert np.linalg.eigvalsh(covariance).min() >= -1e-12
@@ -77,18 +74,18 @@ def test_a_line_is_no_point():
     image, widths = np.zeros((60, 60)), np.ones((60, 60))
     line = np.array([[-10.0, 20.3], [70.0, 35.7]])
     both = np.ones(2, dtype=bool)
-    corner_image.draw(image, widths, line, np.full(2, 1.2), both, np.array([True, False]))
-    assert not corner_image.refine(image, widths, 30, 28, 4)[3]
+    draw(image, widths, line, np.full(2, 1.2), both, np.array([True, False]))
+    assert not refine(image, widths, 30, 28)[3]
     response = cv2.cornerMinEigenVal(image.astype(np.float32), 5, ksize=3)
-    assert response[15:45, 15:45].max() < 0.01 * CornerConfig().ideal
+    assert response[15:45, 15:45].max() < 0.01 * IDEAL
 
 
 def test_the_unit_of_response_is_a_lone_dot():
     image, widths = np.zeros((40, 40)), np.ones((40, 40))
     one = np.ones(1, dtype=bool)
-    corner_image.draw(image, widths, np.array([[20.2, 20.1]]), np.array([1.2]), one, ~one)
+    draw(image, widths, np.array([[20.2, 20.1]]), np.array([1.2]), one, ~one)
     peak = cv2.cornerMinEigenVal(image.astype(np.float32), 5, ksize=3).max()
-    assert peak == pytest.approx(CornerConfig().ideal, rel=0.1)
+    assert peak == pytest.approx(IDEAL, rel=0.1)
 
 
 @pytest.mark.parametrize("n", [181, 361])
@@ -176,12 +173,6 @@ def test_a_scan_of_two_beams_is_survived():
     spec = LaserSpec(n_beams=2, angle_min=0.0, angle_increment=0.01)
     scan = Scan(stamp_ns=0, ranges=np.array([2.0, 2.0], dtype=np.float32), spec=spec)
     assert len(corners(scan).points_robot) == 0
-
-
-def test_impossible_configurations_are_refused():
-    for changes in ({"cell_m": 0.0}, {"range_m": 1e3}, {"response": -1.0}, {"floor_m": math.nan}):
-        with pytest.raises(InvalidValueError, match=next(iter(changes))):
-            CornerConfig(**changes)
 
 
 def test_many_beams_without_an_answer_see_nothing_and_few_have_failed():

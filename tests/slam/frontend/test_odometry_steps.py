@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Streams that no robot made: steps of a million kilometres, years between frames."""
+"""Streams that no robot made, motion over scans that are left out, and the bias that is learnt."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ from pathlib import Path
 
 import numpy as np
 import pytest
+from numpy.typing import NDArray
 
-from slam import Frame, LaserSpec, Odometry, Scan, create, se2
+from slam import LaserSpec, Scan, create, se2
 from slam.errors import InvalidValueError
 from slam.evaluation.points import PointWorld, PointWorldConfig
-from slam.frames import NS_PER_S
+from slam.frames import NS_PER_S, Features, Frame, Odometry
 from slam.frontend import odometry_steps
+from slam.frontend.odometry_prior import HeadingBias
+from slam.frontend.odometry_steps import MotionSum
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import world2d
@@ -125,3 +128,88 @@ def test_every_slam_refuses_frames_out_of_order_at_once(name):
             slam.update(frame(stamp_ns))
     slam.update(frame(2 * 10**9))
     assert slam.trajectory().stamps_ns.tolist() == [10**9, 2 * 10**9]
+
+
+STATED = np.diag([1e-4, 2e-4, 3e-4])
+
+
+def frame(k: int, covariance: np.ndarray | None) -> Frame:
+    odometry = Odometry(stamp_ns=k, T_odom_robot=np.zeros(3), increment_covariance=covariance)
+    seen = Features(stamp_ns=k, points_robot=np.ones((1, 2)), covariances=np.eye(2)[None])
+    return Frame(stamp_ns=k, odometry=odometry, features=seen)
+
+
+def passed(parts: list[np.ndarray | None], every: int) -> list[np.ndarray | None]:
+    motion, out = MotionSum(), []
+    for k, part in enumerate(parts):
+        motion.add(frame(k, part).odometry)
+        if k % every == 0:
+            out.append(motion.passed_on(frame(k, part)).odometry.increment_covariance)
+    return out
+
+
+@pytest.mark.parametrize("first", [None, np.zeros((3, 3))])
+def test_all_motion_since_the_last_frame_counts(first):
+    got = passed([first, *[STATED] * 6], every=3)
+    assert (got[0] is None) == (first is None)
+    np.testing.assert_allclose(got[1:], [3.0 * STATED] * 2)
+
+
+@pytest.mark.parametrize("at", [2, 3, 4])
+def test_a_step_that_states_nothing_is_not_read_as_exact(at):
+    parts = [np.zeros((3, 3)), *[STATED] * 9]
+    parts[at] = None
+    got = passed(parts, every=3)
+    silent = -(-at // 3)
+    assert [covariance is None for covariance in got] == [k == silent for k in range(4)]
+
+
+def test_a_stream_without_covariances_stays_one():
+    assert passed([None] * 7, every=2) == [None] * 4
+
+
+SAID = math.radians(0.3)  # per step, by odometry
+WELL = np.diag([1e4, 1e4, 1e6])
+
+
+def drive(
+    bias: HeadingBias, per_m: float, per_rad: float, information: NDArray[np.float64], noise: float
+) -> None:
+    """300 steps of a robot whose heading the map corrects after each."""
+    rng = np.random.default_rng(1)
+    error = 0.0  # of the estimated heading
+    for k in range(300):
+        true = np.array([0.15, 0.0, 0.2 * math.sin(0.05 * k)])
+        added = true[2] * per_rad + 0.15 * per_m + float(rng.normal(0.0, noise))
+        odometry = true + np.array([0.0, 0.0, added])
+        increment = bias.corrected(odometry)
+        error += increment[2] - true[2]
+        told, given = information[2, 2], SAID**2
+        off = -error * told * given / (1.0 + told * given)
+        bias.learn(increment, 0.2, (given, given), (1.0, off, information))
+        error += off
+
+
+def test_it_finds_what_the_wheels_add() -> None:
+    bias = HeadingBias()
+    drive(bias, 0.015, -0.03, WELL, SAID)
+    assert bias.per_m == pytest.approx(0.015, abs=0.006)  # 2 sigma
+    assert bias.per_rad == pytest.approx(-0.03, abs=0.02)
+
+
+def test_it_learns_nothing_where_the_map_tells_nothing() -> None:
+    bias = HeadingBias()
+    drive(bias, 0.015, -0.03, np.diag([1e4, 1e4, 1.0]), SAID)
+    assert (bias.per_m, bias.per_rad) == (0.0, 0.0)
+    # A heading that a shift aside explains as well is not told either.
+    coupled = np.array([[1e4, 0.0, 0.0], [0.0, 1e4, 1e5], [0.0, 1e5, 1e6 + 1.0]])
+    drive(bias, 0.015, -0.03, coupled, SAID)
+    assert (bias.per_m, bias.per_rad) == (0.0, 0.0)
+
+
+def test_a_wheel_that_slips_teaches_nothing() -> None:
+    bias = HeadingBias()
+    drive(bias, 0.0, 0.0, WELL, 0.0)
+    before = bias.per_m
+    bias.learn(np.array([0.15, 0.0, 0.0]), 0.2, (SAID**2, SAID**2), (1.0, 10.0 * SAID, WELL))
+    assert bias.per_m == before

@@ -12,11 +12,9 @@ import numpy as np
 import pytest
 
 from slam.frames import Float, Frame
-from slam.frontend.range_error import RangeCorrection, RangeError, hats
-from slam.frontend.range_error_config import RangeErrorConfig
+from slam.frontend.range_error import KNOT_M, RangeCorrection, RangeError, hats
 from tests import world2d
 
-CONFIG = RangeErrorConfig(learn="on")
 DRIVE_S = 32.0
 
 
@@ -34,7 +32,7 @@ def learnt(error: Callable[[Float], Float], pose_m: float = 0.0) -> RangeCorrect
     ``pose_m``: deviation of the poses at which the scans are said to be taken.
     """
     rng = np.random.default_rng(7)
-    correction = RangeCorrection(CONFIG, 0.010)
+    correction = RangeCorrection(0.010)
     for frame in exact():
         assert frame.scan is not None
         assert frame.truth is not None
@@ -57,7 +55,7 @@ def without_scale(values: Float, ranges: Float, weights: Float) -> Float:
 def seen_knots(error: RangeError) -> tuple[Float, Float]:
     """(k,) ranges of the knots and how often each was seen, those that were seen well."""
     weights = error.reach / error.reach.sum()
-    knots = error.config.knot_m * np.arange(error.knots)
+    knots = KNOT_M * np.arange(error.knots)
     return knots[weights > 0.03], weights[weights > 0.03]
 
 
@@ -94,7 +92,7 @@ def test_the_scale_stays_zero() -> None:
     """An error in proportion to the range is a larger room: nothing is learnt from it."""
     correction = learnt(lambda ranges: 0.01 * ranges)
     error = correction.error
-    knots = CONFIG.knot_m * np.arange(error.knots)
+    knots = KNOT_M * np.arange(error.knots)
     scale = error.reach @ (error.coefficients[:-1] * knots) / (error.reach @ knots**2)
     assert abs(scale) < 1e-6
     ranges, weights = seen_knots(error)

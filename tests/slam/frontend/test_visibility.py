@@ -11,9 +11,8 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Features, Scan
-from slam.frontend.config import FRONTEND
 from slam.frontend.observations import Observations, from_features, from_scan
-from slam.frontend.visibility import View
+from slam.frontend.visibility import SILENT_M, View
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
 from slam.tracker.rasterise import rasterise
@@ -105,7 +104,7 @@ def test_an_error_code_clears_nothing() -> None:
 
 def test_no_return_clears_up_to_where_silence_means_something() -> None:
     ranges = np.full(361, np.inf)
-    far = FRONTEND.view.silent_m
+    far = SILENT_M
     found = cleared(ranges, things([1.0, 1.5, far + 2.0]))
     assert found.tolist() == [True, True, False]
 

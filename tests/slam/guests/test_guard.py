@@ -13,9 +13,8 @@ from pathlib import Path
 import pytest
 
 from slam.errors import SlamFailedError
-from slam.guests.guarding import MARK as MARK_OF_WORKERS
-from slam.guests.guarding import guarded_workers
-from slam.guests.wire import Wire
+from slam.guests.wire import MARK as MARK_OF_WORKERS
+from slam.guests.wire import Wire, guarded_workers
 from tests.processes import processes_with
 
 pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="orphans are only found on Linux")

@@ -3,7 +3,9 @@
 
 from __future__ import annotations
 
+import ctypes
 import importlib
+import os
 import shutil
 import sys
 from dataclasses import replace
@@ -18,6 +20,7 @@ from slam.evaluation import metrics
 from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.frontend.odometry_prior import Prediction
 from slam.guests import Guest
+from slam.guests.genz import quiet
 from slam.replay import Replay, Track
 from tests.world2d import World2D, arena, frames, laser, wander
 
@@ -180,3 +183,19 @@ def test_a_guest_refuses_what_it_cannot_use(stream: list[Frame]) -> None:
     guest.update(stream[1])
     with pytest.raises(InvalidValueError, match="in order"):
         guest.update(stream[0])
+
+
+def test_what_is_written_within_is_dropped_and_nothing_else(capfd: pytest.CaptureFixture[str]):
+    libc = ctypes.CDLL(None)
+    open_before = set(os.listdir("/dev/fd"))
+    libc.puts(b"before")  # C keeps it for later
+    with quiet():
+        libc.puts(b"within, kept")
+        os.write(1, b"within\n")
+    libc.puts(b"between")
+    with pytest.raises(ZeroDivisionError), quiet():
+        libc.puts(b"within, kept") / 0
+    libc.puts(b"after")
+    libc.fflush(None)
+    assert capfd.readouterr().out == "before\nbetween\nafter\n"
+    assert set(os.listdir("/dev/fd")) == open_before

@@ -16,7 +16,7 @@ from slam import create
 from slam.errors import SlamFailedError
 from slam.frames import Frame
 from slam.guests import wire
-from slam.guests.layers import ranges_of
+from slam.guests.guest import ranges_of
 from slam.oracle import Oracle
 from slam.replay import Track
 from tests.world2d import World2D, arena, frames, laser, wander

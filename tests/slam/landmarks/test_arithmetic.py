@@ -7,7 +7,8 @@ import numpy as np
 import pytest
 
 from slam import se2
-from slam.landmarks import algebra, kernels, pairs
+from slam.landmarks import kernels
+from slam.landmarks.compatibility import distances
 from slam.landmarks.filter import EkfFilter
 
 
@@ -38,7 +39,7 @@ def test_products_are_subtracted_and_mirrored_within_the_size_only(size, terms):
     P = rng.normal(size=(size + 3, size + 3))
     P = P + P.T
     got = P.copy()
-    algebra.subtract_products(got, size, A, B)
+    kernels.subtract_products(got, size, A, B)
     np.testing.assert_allclose(got[:size, :size], P[:size, :size] - A.T @ B, atol=1e-12)
     np.testing.assert_array_equal(got[:size, :size], got[:size, :size].T)
     np.testing.assert_array_equal(got[size:], P[size:])
@@ -51,8 +52,8 @@ def test_linear_equations_are_solved(size):
     root, b = rng.normal(size=(size, size)), rng.normal(size=(size, 7))
     S = root @ root.T + np.eye(size)
     L, x = S.copy(), b.copy()
-    assert algebra.cholesky(L)
-    algebra.solve(L, x)
+    assert kernels.cholesky(L)
+    kernels.solve(L, x)
     np.testing.assert_allclose(S @ x, b, atol=1e-12)
 
 
@@ -95,7 +96,7 @@ def test_a_single_pair_costs_what_the_joint_update_says():
     wanted = np.ones((6, 6), dtype=np.bool_)
     wanted[2] = False
     P = ekf.error_covariance.copy()
-    costs = pairs.distances(ekf.pose, ekf.landmarks, P, z, R, wanted, 1e4, 1e4)
+    costs = distances(ekf.pose, ekf.landmarks, P, z, R, wanted, 1e4, 1e4)
     for k in range(6):
         for j in range(6):
             one = np.array([j])

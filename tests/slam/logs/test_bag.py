@@ -16,7 +16,7 @@ from slam import create, se2
 from slam.errors import LogFormatError
 from slam.frames import Frame
 from slam.logs import open_log, read_bag
-from slam.logs.bag_odometry import Stamped, increment_covariance
+from slam.logs.bag_laser import Stamped, increment_covariance
 
 START, MS = bags.START_NS, 1_000_000
 RANGES = [1.0, 2.0, 3.0, 4.0, 5.0]

@@ -14,8 +14,7 @@ from slam import Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata, se2
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import to_ns
 from slam.logs import open_log, read_carmen, write_carmen
-from slam.logs.repairs import Repairs
-from slam.logs.stamps import put_in_order
+from slam.logs.repairs import Repairs, put_in_order
 
 
 def read(tmp_path, text, name="a.log"):

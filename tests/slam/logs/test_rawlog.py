@@ -18,7 +18,7 @@ from hypothesis import strategies as st
 import tests.slam.logs.mrpt_objects as mrpt
 from slam import LaserSpec, se2
 from slam.errors import LogFormatError
-from slam.guests import rawlog as written
+from slam.guests import mrpt as written
 from slam.logs import open_log, rawlog, read_rawlog
 from tests.slam.logs.damaged import FUZZED, edited, edits, frames_or_refused
 
@@ -160,7 +160,7 @@ def test_a_log_that_mrpt_converted_has_the_same_poses_and_scans(tmp_path, carmen
 
 def test_packed_torn_and_bounded(tmp_path, monkeypatch, caplog):
     whole = b"".join(drive())
-    path = tmp_path / "a.rawlog.gz"
+    path = tmp_path / "a.mrpt.gz"
     path.write_bytes(gzip.compress(whole))
     assert open_log(path).length == 4
     (tmp_path / "by content").write_bytes(gzip.compress(whole))

@@ -11,8 +11,7 @@ import pytest
 
 from slam.errors import LogFormatError
 from slam.logs import open_log, read_carmen
-from slam.logs.repairs import CLOCK_STEPS, STRAY_STAMPS, Repairs
-from slam.logs.stamps import continued, digits_of, put_in_order
+from slam.logs.repairs import CLOCK_STEPS, STRAY_STAMPS, Repairs, continued, digits_of, put_in_order
 
 S = 1_000_000_000
 

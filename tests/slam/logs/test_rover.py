@@ -13,7 +13,7 @@ import pytest
 from slam import se2
 from slam.errors import LogFormatError
 from slam.logs import open_log, read_rover
-from slam.logs.rover_format import read_format
+from slam.logs.rover import read_format
 
 TICKS = """
 [time]

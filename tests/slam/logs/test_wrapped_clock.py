@@ -8,8 +8,7 @@ import pytest
 
 from slam.errors import LogFormatError
 from slam.logs import open_log
-from slam.logs.repairs import CLOCK_STEPS, STAMPS_WRAPPED, Repairs
-from slam.logs.stamps import continued, unwrapped
+from slam.logs.repairs import CLOCK_STEPS, STAMPS_WRAPPED, Repairs, continued, unwrapped
 
 S = 1_000_000_000
 N, STEP = 60, 0.3

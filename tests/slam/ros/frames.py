@@ -33,11 +33,11 @@ def driven(n: int) -> list[Frame]:
 
 
 class InMemory:
-    """A link to nobody: what a test puts in is taken."""
+    """A link to nobody: what a test puts in, by name or topic, is taken."""
 
     def __init__(self) -> None:
         self.sent: dict[str, list[bytes]] = defaultdict(list)
-        self.come: dict[str, list[Taken]] = defaultdict(list)
+        self.come: dict[str | Topic, list[Taken]] = defaultdict(list)
 
     def advertise(self, topic: Topic) -> None:
         self.sent[topic.name]
@@ -49,4 +49,4 @@ class InMemory:
         self.sent[topic.name].append(data)
 
     def take(self, topic: Topic) -> list[Taken]:
-        return self.come.pop(topic.name, [])
+        return self.come.pop(topic, []) or self.come.pop(topic.name, [])

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// A node on Fast DDS, which is no code of ours: dead reckoning, and a twist for the robot.
-//   node FILE N   writes each of N scans into FILE, drives with 0.3 m/s, and ends
-//   node          answers each scan with map -> odom = identity until it is killed
+// A node on Fast DDS, which is no code of ours: it says "ready", and then
+//   node FILE N [stamped]  writes each of N scans into FILE, drives with 0.3 m/s, and ends
+//   node                   answers each scan with map -> odom = identity until it is killed
 #include <chrono>
 #include <cstdlib>
 #include <fstream>
@@ -27,21 +27,25 @@ int main(int argc, char** argv)
 {
     const int wanted = argc > 2 ? std::atoi(argv[2]) : 0;
     const char* domain = std::getenv("ROS_DOMAIN_ID");
+    const char* own_ip = std::getenv("NODE_IP");  // and that of the robot, where they are not the loopback's
+    const char* robot_ip = std::getenv("ROBOT_IP");
     DomainParticipantQos own;
     {   // as rmw_fastrtps does for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
         auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
-        udp->interfaceWhiteList.push_back("127.0.0.1");
+        udp->interfaceWhiteList.push_back(own_ip ? own_ip : "127.0.0.1");
         udp->maxInitialPeersRange = 32;
         own.transport().use_builtin_transports = false;
         own.transport().user_transports.push_back(udp);
         eprosima::fastrtps::rtps::Locator_t peer;
-        eprosima::fastrtps::rtps::IPLocator::setIPv4(peer, "127.0.0.1");
+        eprosima::fastrtps::rtps::IPLocator::setIPv4(peer, robot_ip ? robot_ip : "127.0.0.1");
         own.wire_protocol().builtin.initialPeersList.push_back(peer);
     }
     auto* participant = DomainParticipantFactory::get_instance()->create_participant(
         domain ? std::atoi(domain) : 0, own);
     TypeSupport scan_type(new sensor_msgs::msg::dds_::LaserScan_PubSubType());
     TypeSupport twist_type(new geometry_msgs::msg::dds_::Twist_PubSubType());
+    if (argc > 3)
+        twist_type = TypeSupport(new geometry_msgs::msg::dds_::TwistStamped_PubSubType());
     TypeSupport tf_type(new tf2_msgs::msg::dds_::TFMessage_PubSubType());
     for (auto& type : {scan_type, twist_type, tf_type})
         type.register_type(participant);
@@ -62,6 +66,7 @@ int main(int argc, char** argv)
     std::ofstream out(wanted ? argv[1] : "/dev/null", std::ios::binary);
     Scan scan;
     SampleInfo info;
+    std::cout << "ready" << std::endl;
     for (int taken = 0; wanted == 0 || taken < wanted;)
     {
         if (!reader->wait_for_unread_message({10, 0}))
@@ -88,19 +93,20 @@ int main(int argc, char** argv)
             out << head.frame_id() << '\n';
             ++taken;
 
+            geometry_msgs::msg::dds_::TwistStamped_ stamped;
+            stamped.twist().linear().x() = 0.3;
             tf2_msgs::msg::dds_::TFMessage_ tf;
             tf.transforms().resize(1);
             tf.transforms()[0].header().stamp() = head.stamp();
             tf.transforms()[0].header().frame_id() = "map";
             tf.transforms()[0].child_frame_id() = "odom";
             tf.transforms()[0].transform().rotation().w() = 1.0;
-            localises->write(&tf);
-            if (wanted)
-            {
-                geometry_msgs::msg::dds_::Twist_ twist;
-                twist.linear().x() = 0.3;
-                drives->write(&twist);
-            }
+            if (!wanted)
+                localises->write(&tf);
+            else if (argc > 3)
+                drives->write(&stamped);
+            else
+                drives->write(&stamped.twist());
         }
     }
     out.close();

@@ -4,23 +4,25 @@
 from __future__ import annotations
 
 import sys
+from pathlib import Path
 
 import numpy as np
 import pytest
 
 from slam import se2
-from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedError
+from slam.errors import InvalidValueError, LogFormatError, MissingDependencyError, SlamFailedError
 from slam.estimate import Raster
 from slam.frames import NS_PER_S
 from slam.ros import slam as ros2
 from slam.ros.child import Domain
-from slam.ros.heard import StampedPose
+from slam.ros.heard import StampedPose, decoded
 from slam.ros.link import Taken, Topic, open_link
 from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
-from slam.ros.navigation_messages import MapMessage
+from slam.ros.navigation_messages import ClockMessage, MapMessage
 from slam.ros.node import GRID, POSES, TF, Node
-from slam.ros.recorded import RecordedSlam
+from slam.ros.recorded import RecordedSlam, aligned
 from slam.ros.robot import Robot
+from slam.ros.template import said_ns
 from slam.system import create
 from tests.slam.ros.frames import InMemory, driven
 
@@ -42,23 +44,23 @@ FIRST, SECOND = driven(2)
 
 def test_the_frame_of_the_first_pose_is_ours_whatever_the_nodes_map_is(node):
     node, link = node
-    node.sent(FIRST.odometry)
+    node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
     assert not node.answered()
     link.come[TF.name] = [transform(FIRST.stamp_ns)]
     assert node.answered()
-    assert node.estimate() == pytest.approx(np.zeros(3), abs=1e-15)
-    node.sent(SECOND.odometry)
+    assert node.estimate().T_map_robot == pytest.approx(np.zeros(3), abs=1e-15)
+    node.sent(SECOND.odometry, said_ns(SECOND.stamp_ns))
     link.come[TF.name] = [transform(SECOND.stamp_ns, SAID + np.array([0.1, 0.0, 0.0]))]
     assert node.answered()
     moved = se2.between(FIRST.odometry.T_odom_robot, SECOND.odometry.T_odom_robot)
-    shifted = node.estimate() - moved
+    shifted = node.estimate().T_map_robot - moved
     assert np.hypot(*shifted[:2]) == pytest.approx(0.1)
 
 
 def test_a_late_transform_is_no_answer_and_still_stands(node):
     node, link = node
-    node.sent(FIRST.odometry)
-    node.sent(SECOND.odometry)
+    node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
+    node.sent(SECOND.odometry, said_ns(SECOND.stamp_ns))
     link.come[TF.name] = [transform(FIRST.stamp_ns)]
     assert not node.answered()
     assert node.T_own_odom is not None
@@ -66,7 +68,7 @@ def test_a_late_transform_is_no_answer_and_still_stands(node):
 
 def test_a_clock_an_hour_off_is_named(node):
     node, link = node
-    node.sent(FIRST.odometry)
+    node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
     link.come[TF.name] = [transform(FIRST.stamp_ns + 3600 * NS_PER_S)]
     assert not node.answered()
     assert node.T_own_odom is None
@@ -75,31 +77,31 @@ def test_a_clock_an_hour_off_is_named(node):
 
 def test_malformed_samples_and_a_second_publisher_are_counted_and_left_out(node, caplog):
     node, link = node
-    node.sent(FIRST.odometry)
+    node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
     whole = transform(FIRST.stamp_ns)
     nan = transform(FIRST.stamp_ns, [np.nan, 0.0, 0.0], sender="c")
     other = transform(FIRST.stamp_ns, [9.0, 9.0, 0.0], sender="b")
     link.come[TF.name] = [Taken(whole.data[:30], "c"), Taken(b"", "c"), nan, whole, other]
     assert node.answered()
     assert node.odd == {"malformed": 3, "from_others": 1}
-    assert node.estimate() == pytest.approx(np.zeros(3), abs=1e-15)
+    assert node.estimate().T_map_robot == pytest.approx(np.zeros(3), abs=1e-15)
     assert "a second node states map -> odom" in caplog.text
 
 
 def test_a_pose_is_an_answer_and_states_the_covariance(node):
     node, link = node
-    node.sent(FIRST.odometry)
+    node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
     spread = np.diag([0.01, 0.02, 0.03])
     pose = IncrementMessage(MAP)(FIRST.stamp_ns, np.array([1.0, 2.0, 0.0]), spread)
     link.come[POSES[0].name] = [Taken(bytes(pose), "a")]
     assert node.answered()
-    assert node.estimate() == pytest.approx(np.zeros(3), abs=1e-15)
-    assert np.sort(np.diag(node.covariance)) == pytest.approx([0.01, 0.02, 0.03])
+    assert node.estimate().T_map_robot == pytest.approx(np.zeros(3), abs=1e-15)
+    assert np.sort(np.diag(node.estimate().covariance)) == pytest.approx([0.01, 0.02, 0.03])
 
 
 def test_its_map_comes_back(node):
     node, link = node
-    node.sent(FIRST.odometry)
+    node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
     values = np.array([[0.0, 1.0, np.nan], [0.5, 0.25, 0.0]], dtype=np.float32)
     raster = Raster(values=values, resolution_m=0.1, T_map_origin=np.array([-1.0, -2.0, 0.0]))
     link.come[GRID.name] = [Taken(bytes(MapMessage(raster)(FIRST.stamp_ns)), "a")]
@@ -122,7 +124,13 @@ def test_a_robot_sends_what_a_bag_holds_and_no_truth_where_a_frame_has_none():
     }  # fmt: skip
 
 
-def test_a_recorded_stack_is_looked_up_as_tf2_does():
+@pytest.mark.parametrize(("second", "said"), [(0, 1_700_000_000), (1_800_000_000, 1_800_000_000)])
+def test_times_of_a_simulation_are_said_later_and_those_of_a_log_as_they_are(second, said):
+    clock = decoded(ClockMessage.KIND, bytes(ClockMessage()(second * NS_PER_S))).clock
+    assert (clock.sec, clock.nanosec) == (said, 0)
+
+
+def test_of_a_recorded_stack_the_newest_transform_stands():
     frames = driven(40)
     said = [StampedPose(f.stamp_ns, SAID) for f in frames[::10]]
     slam = RecordedSlam(said)
@@ -132,10 +140,10 @@ def test_a_recorded_stack_is_looked_up_as_tf2_does():
     np.testing.assert_allclose([e.T_map_robot for e in estimates], wanted, atol=1e-12)
     hour_ns = 3600 * NS_PER_S
     late = [s._replace(stamp_ns=s.stamp_ns + hour_ns) for s in said]
-    with pytest.raises(InvalidValueError, match="--clock-offset -3600"):
-        RecordedSlam(late).update(frames[0])
-    aligned = RecordedSlam(late, clock_offset_s=-3600.0)
-    assert aligned.update(frames[0]).converged
+    bag, first_ns = Path("bag"), frames[0].stamp_ns
+    with pytest.raises(LogFormatError, match=r"bag: .* 3600\.000 s after .* --clock-offset -3600"):
+        aligned(bag, late, first_ns, offset_s=0.0, epoch_ns=0)
+    assert aligned(bag, late, first_ns, offset_s=-3600.0, epoch_ns=0) == said
 
 
 def test_recorded_poses_are_carried_on_by_odometry():

@@ -4,45 +4,31 @@
 from __future__ import annotations
 
 import os
-import shutil
-import subprocess
-import sys
+import shlex
 import time
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
 import pytest
 
+from scripts.live.network import Network
+from scripts.live.session import Opener
 from slam import se2
 from slam.ros import slam as ros2
-from slam.ros.child import ROUTER, Domain
-from slam.ros.link import Topic, open_link
+from slam.ros.link import Topic
+from slam.ros.node import TF, Node
 from slam.ros.robot import Robot
+from slam.ros.template import said_ns
 from slam.system import create
+from tests.slam.ros.clients import PREFIXES, on, started
 from tests.slam.ros.frames import SPEC, driven
-from tests.slam.ros.idl import idl_of
 
-HERE = Path(__file__).parent
-KINDS = ("sensor_msgs/msg/LaserScan", "geometry_msgs/msg/Twist", "tf2_msgs/msg/TFMessage")
 CMD_VEL = Topic(name="/cmd_vel", kind="geometry_msgs/msg/Twist", depth=1000)
+ANSWERS = replace(TF, depth=1000)
 SCANS = 1000
 EPOCH_S = 1_700_000_000
 pytestmark = pytest.mark.slow
-
-
-@pytest.fixture(scope="module")
-def node(tmp_path_factory) -> Path:
-    """The C++ node, built."""
-    pytest.importorskip("cyclonedds", reason="needs the extra ros2")
-    if not shutil.which("fastddsgen") or not shutil.which("g++"):
-        pytest.skip("needs fastddsgen, libfastrtps-dev and g++ (Debian has them)")
-    folder = tmp_path_factory.mktemp("node")
-    (folder / "ros.idl").write_text(idl_of(KINDS))
-    words = ["g++", "-std=c++17", "-O0", "-w", "-I.", str(HERE / "node.cpp"), "ros.cxx"]
-    libraries = ["rosPubSubTypes.cxx", "-lfastrtps", "-lfastcdr", "-o", "node"]
-    for command in (["fastddsgen", "-replace", "ros.idl"], [*words, *libraries]):
-        subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=300)
-    return folder / "node"
 
 
 def read(path: Path) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray, bytes]]:
@@ -59,29 +45,32 @@ def read(path: Path) -> list[tuple[int, np.ndarray, np.ndarray, np.ndarray, byte
     return found
 
 
-def test_fast_dds_gets_every_field_of_every_scan_and_drives(node, tmp_path):
-    domain = Domain("dds", own=True, wait_s=10.0)
-    link = open_link("dds", domain=domain.number)
-    link.subscribe(CMD_VEL)
-    robot, out = Robot(link), tmp_path / "scans"
-    child = subprocess.Popen([node, out, str(SCANS)], env={**os.environ, **domain.environment()})
-    while not link.listeners(robot.topics["/scan"]):
-        assert child.poll() is None
-        time.sleep(0.02)
-    time.sleep(1.0)
-    frames, twists = driven(SCANS), 0
-    for frame in frames:
-        robot.send(frame)
-        time.sleep(1.0 / 37.5)
-        twists += len(link.take(CMD_VEL))
-    assert child.wait(30.0) == 0
-    time.sleep(0.5)
-    twists += len(link.take(CMD_VEL))
-    link.close()
-    domain.free()
+def test_one_gets_every_field_and_drives_while_another_is_scored(client, tmp_path):
+    middleware, words = client
+    with on(middleware) as (domain, link):
+        link.subscribe(CMD_VEL)
+        link.subscribe(ANSWERS)
+        robot, slam, out = Robot(link), Node(link), tmp_path / "scans"
+        with started([*words, out, SCANS], domain) as drives, started(words, domain):
+            time.sleep(2.0)  # all have found each other
+            frames, twists, answers, poses = driven(SCANS), 0, 0, []
+            for frame in frames:
+                slam.sent(frame.odometry, said_ns(frame.stamp_ns))
+                robot.send(frame)
+                time.sleep(1.0 / 37.5)
+                slam.answered()
+                poses.append(slam.estimate().T_map_robot)
+                twists, answers = (
+                    twists + len(link.take(CMD_VEL)),
+                    answers + len(link.take(ANSWERS)),
+                )
+            assert drives.wait(30.0) == 0
+            time.sleep(0.5)
+            twists, answers = twists + len(link.take(CMD_VEL)), answers + len(link.take(ANSWERS))
     got = read(out)
-    assert len(got) == SCANS
-    assert twists == SCANS
+    assert (len(got), twists, answers) == (SCANS, SCANS, SCANS)
+    wanted = [se2.between(frames[0].odometry.T_odom_robot, f.odometry.T_odom_robot) for f in frames]
+    np.testing.assert_allclose(poses, wanted, atol=1e-12)
     end = SPEC.angle_min + 360 * SPEC.angle_increment
     numbers = np.array([SPEC.angle_min, end, SPEC.angle_increment, 0.0, 0.0, 0.0, 80.0], "f4")
     for frame, (stamp_ns, said, ranges, intensities, frame_id) in zip(frames, got, strict=True):
@@ -92,9 +81,30 @@ def test_fast_dds_gets_every_field_of_every_scan_and_drives(node, tmp_path):
         assert frame_id == b"laser"
 
 
-def dead_reckoned(name: str, n: int) -> None:
-    """The SLAM of that name says what odometry says of each of n frames."""
-    slam, frames = create(name), driven(n)
+def test_their_stamped_twists_move_the_robot(client):
+    middleware, words = client
+    session = Opener(slams=["odometry"], settings={"scene": "arena"}, seconds=600.0).open()
+    with on(middleware) as (domain, link):
+        network = Network(link)
+        network.begin(session.static_map, session.scan_height_m)
+        with started([*words, os.devnull, 60, "stamped"], domain) as drives:
+            time.sleep(2.0)
+            for shown in session.run():
+                network.send(shown)
+                time.sleep(1.0 / 37.5)
+                for request in network.requests():
+                    session.hands.do(request)
+                if drives.poll() is not None:
+                    break
+    moved = shown.frame.truth - session.moments.T_world_map
+    assert session.hands.client_drives
+    assert np.hypot(*moved[:2]) > 0.2
+
+
+def test_another_make_is_a_slam(client, monkeypatch):
+    middleware, words = client
+    monkeypatch.setattr(ros2, "ANSWER_S", 20.0)  # a busy machine
+    slam, frames = create(f"{PREFIXES[middleware]}:{shlex.join(map(str, words))}"), driven(100)
     answered = 0
     for frame in frames:
         estimate = slam.update(frame)
@@ -102,16 +112,4 @@ def dead_reckoned(name: str, n: int) -> None:
         wanted = se2.between(frames[0].odometry.T_odom_robot, frame.odometry.T_odom_robot)
         np.testing.assert_allclose(estimate.T_map_robot, wanted, atol=1e-12)
     slam.close()
-    assert answered == n
-
-
-def test_fast_dds_is_a_slam(node, monkeypatch):
-    monkeypatch.setattr(ros2, "ANSWER_S", 20.0)  # a busy machine
-    dead_reckoned(f"ros2:{node}", 100)
-
-
-def test_another_make_of_zenoh_is_a_slam(monkeypatch):
-    pytest.importorskip("zenoh_ros2_sdk", reason="needs zenoh-ros2-sdk")
-    monkeypatch.setattr(ros2, "ANSWER_S", 20.0)
-    monkeypatch.setattr("slam.ros.child.Domain.router", ROUTER + 501)
-    dead_reckoned(f"ros2-zenoh:{sys.executable} {HERE / 'zenoh_client.py'} {ROUTER + 501}", 100)
+    assert answered == 100

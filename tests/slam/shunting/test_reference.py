@@ -15,7 +15,7 @@ from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float, Frame, Odometry
 from slam.frontend.odometry_prior import predict
-from slam.frontend.odometry_sum import thinned
+from slam.frontend.odometry_steps import thinned
 from slam.shunting import ShuntingConfig, ShuntingSlam, reference
 from slam.shunting.reference import ACROSS, CELL, Reference
 from tests.world2d import World2D, arena, frames, laser, wander

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 import slam
 from slam import se2
-from slam.compiling import COMPILING
+from slam._jit import COMPILING
 from slam.errors import InvalidValueError
 from slam.frames import Features, Frame, Odometry, Scan
 from slam.shunting import ShuntingConfig, ShuntingSlam

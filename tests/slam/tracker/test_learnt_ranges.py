@@ -13,7 +13,6 @@ from slam import se2
 from slam.frames import Float, Frame
 from slam.frontend.observations import observe
 from slam.frontend.range_error import RangeError
-from slam.frontend.range_error_config import RangeErrorConfig
 from slam.shunting import ShuntingSlam
 from slam.tracker.config import TrackerConfig
 from slam.tracker.learnt_ranges import less
@@ -78,7 +77,7 @@ def test_off_is_the_default_of_both_presets() -> None:
 def test_key_frames_follow_what_is_learnt_later() -> None:
     frame = driven(wrong=True)[0]
     seen = observe(frame, np.zeros(3), TrackerConfig())
-    error = RangeError(RangeErrorConfig())
+    error = RangeError()
     nothing, offset = np.zeros(error.knots + 1), np.full(error.knots + 1, 0.02)
     nearer = less(seen, error, nothing, offset)
     laser = seen.T_robot_laser[:2]

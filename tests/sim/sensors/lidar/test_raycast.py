@@ -229,6 +229,30 @@ def test_a_whole_turn_of_two_fans_while_robot_and_things_move() -> None:
             assert ids[caster.hits[1][0, beam, 0]] == want[1][0]
 
 
+def test_what_rests_begins_to_move_or_is_put_elsewhere_as_a_new_caster_sees_it() -> None:
+    """Poses and bounds of what has not moved are kept from scan to scan."""
+    rng = np.random.default_rng(12)
+    model, data = random_world(rng)
+    used = Raycaster(model, height=HEIGHT, robot=None)
+    angles = np.linspace(-math.pi, math.pi, 361)
+    slots = np.repeat(np.arange(3), 121)[:361]
+    ways = [FanPlan.of([(np.arange(361), angles, slots, rng.random(361))]) for _ in range(2)]
+    for scan in range(12):
+        new = Raycaster(model, height=HEIGHT, robot=None)
+        for slot in range(4):
+            if slot or scan % 3 == 0:  # between two scans, or between two notes of one
+                rows = 7 * np.flatnonzero(rng.random(model.nbody - 1) < 0.1)
+                data.qpos[rows] += rng.uniform(-0.3, 0.3, rows.size)
+            mujoco.mj_kinematics(model, data)
+            for caster in (used, new):
+                caster.note() if slot else caster.start(data)
+                caster.lasers[slot] = (0.1, 0.2, 0.01 * slot)
+        for caster in (used, new):
+            caster.cast(ways[scan % 2])
+        for a, b in zip(used.hits, new.hits, strict=True):
+            assert a.tobytes() == b.tobytes()
+
+
 def test_the_rays_of_a_spot_go_where_its_disc_says() -> None:
     rng = np.random.default_rng(4)
     model, data = random_world(rng)

@@ -13,7 +13,6 @@ from slam import se2
 from slam._jit import njit
 from slam.frames import Features, Odometry, Scan
 from slam.frontend import surfaces
-from slam.frontend.config import Joining
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_prior import inverted, predict, turned
 from slam.shunting.config import ShuntingConfig
@@ -30,14 +29,10 @@ CONFIG = ShuntingConfig(cell_m=0.05)
 
 @njit
 def join(
-    points: Array, beams: Array, origin: Array, numbers: Joining, out: Array, tangents: Array
+    points: Array, beams: Array, origin: Array, near: float, out: Array, tangents: Array
 ) -> None:
     """Only other kernels can call it."""
-    surfaces.join(points, beams, origin, numbers, out, tangents)
-
-
-def joining(near_m: float) -> Joining:
-    return CONFIG.frontend.surfaces.joining(CONFIG.cell_m)._replace(near_m=near_m)
+    surfaces.join(points, beams, origin, near, out, tangents)
 
 
 def room_scan(pose: Array, n_beams: int = 181) -> Scan:
@@ -133,13 +128,13 @@ def test_returns_of_one_wall_are_joined_and_those_across_a_gap_are_not() -> None
     post = np.array([[4.4, 1.0], [4.8, 3.5]])
     points = np.vstack([wall, post])
     joined, tangents = np.zeros(13, np.bool_), np.zeros((13, 2))
-    join(points, np.arange(13), np.array([2.0, 0.0, 0.0]), joining(0.1), joined, tangents)
+    join(points, np.arange(13), np.array([2.0, 0.0, 0.0]), 0.1, joined, tangents)
     assert joined[:10].all()
     assert not joined[10:].any()
     np.testing.assert_allclose(tangents[1:10], np.tile([1.0, 0.0], (9, 1)))
     beams = np.arange(13)
     beams[5:] += 1  # a beam without a return between the fifth and the sixth
-    join(points, beams, np.array([2.0, 0.0, 0.0]), joining(0.1), joined, tangents)
+    join(points, beams, np.array([2.0, 0.0, 0.0]), 0.1, joined, tangents)
     assert not joined[4]
 
 
@@ -147,7 +142,7 @@ def test_table_legs_in_line_with_a_wall_are_not_joined_to_it() -> None:
     """A near leg, a far leg and the wall, nearly radial and evenly spaced: three hits in line."""
     points = np.array([[1.00, 0.0], [1.60, 0.02], [2.25, 0.04], [2.25, 0.09], [2.25, 0.14]])
     joined, tangents = np.zeros(5, np.bool_), np.zeros((5, 2))
-    join(points, np.arange(5), np.zeros(3), joining(0.06), joined, tangents)
+    join(points, np.arange(5), np.zeros(3), 0.06, joined, tangents)
     assert joined.tolist() == [False, False, True, True, False]
 
 

@@ -1,0 +1,167 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Look for rooms that are hard and fair: ``python -m scripts.benchmark.search kidnaps --tries 20``.
+
+Draws tops of tracks from a declared space, and runs them on training seeds, one after another. One
+is dropped as soon as the SLAM can no longer lose half of its runs there, or both oracles were lost.
+The cheapest question comes first: the oracles run only where the SLAM was lost. Each run is a line
+of ``--out``; the same command goes on from there.
+"""
+
+from __future__ import annotations
+
+import argparse
+import json
+import sys
+import tempfile
+import zlib
+from collections.abc import Mapping, Sequence
+from dataclasses import asdict
+from itertools import product
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+
+from scripts.benchmark.scores import FAIR_M, TRACKING, Row
+from scripts.benchmark.tracks import GOOD_ODOMETRY, LEVELS, TRAIN, Track
+from scripts.comparison.entry import Entry
+from scripts.comparison.recording import load, record
+from sim.core.versions import WORLD
+from slam.errors import InvalidValueError, MobiliaError
+from slam.evaluation.statistics import quantile
+from slam.frames import BeamClass
+from slam.guests import Limits
+
+POOR = "probabilistic_robotics"
+_ALONE: Mapping[str, tuple[Any, ...]] = {"motion": (1.0,), "change": (0.0,)}
+LEAST = 3  # runs that an error is judged by
+_CROWDS = ("escorts", "streams", "boards", "beds")
+_OF_TRACK = ("scene", "odometry", "every", "seconds", "oracle")
+# By name: of each parameter of a track or of its top level the values that are tried; of what
+# "crowd." names, how many.
+SPACES: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
+    "kidnaps": {
+        **_ALONE, "scene": ("apartment",), "seconds": (90.0,),
+        "kidnap_every_s": (25.0, 30.0, 40.0), "crowd.escorts": (4, 6, 8),
+        "crowd.streams": (4, 8, 12), "n_chairs": (0, 10),
+    },
+    "boards": {
+        **_ALONE, "scene": ("gallery",), "seconds": (90.0,), "n_chairs": (0,),
+        "crowd.boards": (8, 9, 10, 12), "crowd.escorts": (0, 2, 4, 6), "every": (8, 19),
+    },
+    "people": {
+        **_ALONE, "scene": ("office", "gallery"), "seconds": (90.0,), "every": (8, 19, 37),
+        "crowd.escorts": (6, 12, 20), "crowd.streams": (0, 6), "crowd.beds": (0, 6),
+        "crowd.boards": (0, 2),
+    },
+    "half-turn": {  # a room that is the same after half a turn
+        **_ALONE, "scene": ("arena",), "n_chairs": (0, 20), "moving_share": (1.0,),
+        "crowd.boards": (3, 4, 5), "crowd.escorts": (0, 4, 8), "every": (8, 19),
+    },
+    "no-walls": {
+        **_ALONE, "scene": ("arena",), "walls": ("none",), "n_chairs": (30, 40),
+        "moving_share": (0.0,), "crowd.escorts": (8, 10, 12), "crowd.boards": (1, 2),
+        "oracle": ("oracle(shunting,moving)",),
+    },
+    "changes": {  # what stands is out of range most of the time
+        "motion": (0.0,), "change": (1.0,), "scene": ("random-rooms",), "range_mode": ("8m",),
+        "size_m": (36.0, 40.0), "n_rooms": (2,),
+        "clutter": (0.0,), "n_chairs": (150, 250), "seconds": (90.0,),
+        "change_at_s": (None, 45.0), "odometry": (GOOD_ODOMETRY, POOR),
+    },
+}  # fmt: skip
+
+
+def drawn(space: str, k: int) -> Track:
+    """Draw ``k`` of that space: a track with the same at all of its levels."""
+    rng = np.random.default_rng([zlib.crc32(space.encode()), k])
+    told = {name: of[int(rng.integers(len(of)))] for name, of in SPACES[space].items()}
+    own = {name: told.pop(name) for name in _OF_TRACK if name in told}
+    crowd = {n: told.pop(f"crowd.{n}") for n in _CROWDS if f"crowd.{n}" in told}
+    told["crowd"] = ",".join(f"{name}:{n}" for name, n in crowd.items() if n) or "none"
+    sets = {"n_people": 0, **{name: value for name, value in told.items() if value is not None}}
+    return Track(
+        name=f"{space}-{k + 1}-v1", about="", world=WORLD, axis="", **own,
+        says=("",) * len(LEVELS), sets=(sets,) * len(LEVELS),
+    )  # fmt: skip
+
+
+def tried(track: Track, level: float, seed: int, slam: str) -> Row:
+    """One run: the row of the SLAM, and of the oracles where it was lost."""
+    plan = track.plan((), (seed,), levels=(level,))
+    with tempfile.TemporaryDirectory() as folder:
+        file = Path(folder) / "run.npz"
+        record(file, every=plan.every, **asdict(plan.recipe(plan.runs()[0])))
+        drive = load(file)
+    rows: dict[str, Row] = {}
+    for name in (slam, *track.oracles):
+        entry = Entry(name, drive, Limits(), judge_maps=False)
+        entry.over(drive.frames)
+        row = json.loads(entry.arrays()["row"])
+        rows[name] = {key: row.get(key) for key in ("lost", TRACKING)}
+        if not rows[slam]["lost"]:
+            break
+    seen = [f.scan.valid & (f.labels.kind == BeamClass.STATIC)
+            for f in drive.frames if f.scan and f.labels]  # fmt: skip
+    return {"seed": seed, "walls_share_of_beams": round(float(np.mean(seen)), 3), "slams": rows}
+
+
+def standing(track: Track, runs: Sequence[Row], slam: str, most: int) -> tuple[str, Row]:
+    """Whether it is "open" while runs are missing, "dropped" or "found"; what is known so far."""
+    lost, holds = sum(run["slams"][slam]["lost"] for run in runs), list[str]()
+    for oracle in track.oracles:
+        own = [run["slams"][oracle] for run in runs if oracle in run["slams"]]
+        errors = [row[TRACKING] for row in own if row[TRACKING] is not None]
+        near = len(errors) < LEAST or quantile(errors, 0.5) <= FAIR_M
+        holds += [oracle] if near and not any(row["lost"] for row in own) else []
+    hopeless = 2 * (lost + most - len(runs)) < most or (len(runs) == 2 and not lost)
+    state = "dropped" if hopeless or not holds else "found" if len(runs) == most else "open"
+    return state, {"lost": lost, "runs": len(runs), "holds": holds}
+
+
+def search(spaces: Sequence[str], tries: range, seeds: Sequence[int], slam: str, out: Path) -> None:
+    """Try draws of each space; prints what each came to."""
+    done = [json.loads(line) for line in out.read_text().splitlines()] if out.exists() else []
+    for k, space in product(tries, spaces):
+        track, runs = drawn(space, k), list[Row]()
+        state, told = "open", dict[str, Any]()
+        while state == "open":
+            seed = seeds[len(runs)]
+            asked = {"track": track.sha256, "slam": slam, "seed": seed}
+            run = next((row for row in done if asked.items() <= row.items()), None)
+            try:
+                run = run or {**asked, **tried(track, LEVELS[-1], seed, slam)}
+            except InvalidValueError as error:  # such as a crowd that has no room
+                state, told = "impossible", {"why": str(error)}
+                break
+            if run not in done:
+                with out.open("a") as file:
+                    file.write(json.dumps(run) + "\n")
+            runs.append(run)
+            state, told = standing(track, runs, slam, len(seeds))
+        about = {name: getattr(track, name) for name in _OF_TRACK} | dict(track.sets[0])
+        print(state, space, k, told, about, flush=True)
+
+
+def main(arguments: Sequence[str] | None = None) -> int:
+    """Search."""
+    parser = argparse.ArgumentParser(description=__doc__)
+    parser.add_argument("spaces", nargs="+", choices=sorted(SPACES))
+    parser.add_argument("--first", type=int, default=0, help="draw")
+    parser.add_argument("--tries", type=int, default=20, help="draws")
+    parser.add_argument("--seeds", type=int, default=6, help="of the training seeds, for each draw")
+    parser.add_argument("--slam", default="shunting")
+    parser.add_argument("--out", type=Path, default=Path("out/search.jsonl"))
+    wanted = parser.parse_args(arguments)
+    wanted.out.parent.mkdir(parents=True, exist_ok=True)
+    tries = range(wanted.first, wanted.first + wanted.tries)
+    try:
+        search(wanted.spaces, tries, TRAIN[: wanted.seeds], wanted.slam, wanted.out)
+    except (MobiliaError, OSError) as error:
+        print(error, file=sys.stderr)
+        return 1
+    return 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

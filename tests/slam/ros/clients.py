@@ -1,0 +1,37 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Domains of their own, and clients in them."""
+
+from __future__ import annotations
+
+import os
+import subprocess
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+
+from slam.ros.child import Domain
+from slam.ros.link import Link, open_link
+
+PREFIXES = {"dds": "ros2", "zenoh": "ros2-zenoh"}  # of SLAMs
+
+
+@contextmanager
+def started(words: Sequence[object], domain: Domain) -> Iterator[subprocess.Popen[str]]:
+    """A client that listens, until it is let go."""
+    out = {"stdout": subprocess.PIPE, "text": True}
+    child = subprocess.Popen([*map(str, words)], env={**os.environ, **domain.environment()}, **out)
+    with child:
+        assert child.stdout.readline() == "ready\n"
+        try:
+            yield child
+        finally:
+            child.kill()
+
+
+@contextmanager
+def on(middleware: str) -> Iterator[tuple[Domain, Link]]:
+    """A link in a domain of its own."""
+    domain = Domain(middleware, own=True, wait_s=10.0)
+    link = open_link(middleware, domain=domain.number, router=domain.router)
+    yield domain, link
+    link.close()
+    domain.free()

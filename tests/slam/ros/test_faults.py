@@ -1,0 +1,152 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What goes wrong between real processes, with nodes of other makes: what is said, what goes on."""
+
+from __future__ import annotations
+
+import os
+import shlex
+import shutil
+import subprocess
+import time
+from collections.abc import Callable, Iterator
+from contextlib import closing
+from dataclasses import replace
+
+import numpy as np
+import pytest
+
+from slam import se2
+from slam.errors import SlamFailedError
+from slam.frames import NS_PER_S
+from slam.ros import slam as ros2
+from slam.ros.heard import decoded, transform_of
+from slam.ros.link import open_link
+from slam.ros.messages import MAP, ODOM, TransformMessage
+from slam.ros.node import TF, Node
+from slam.ros.robot import Robot
+from slam.ros.template import said_ns
+from slam.system import create
+from tests.slam.ros.clients import PREFIXES, on, started
+from tests.slam.ros.frames import driven
+
+HZ = 37.5
+CUT_S = 5.0
+ANSWERS = replace(TF, depth=1000)
+pytestmark = pytest.mark.slow
+
+
+def test_a_node_that_is_killed_ends_its_own_run(client, monkeypatch):
+    monkeypatch.setattr(ros2, "ANSWER_S", 20.0)
+    middleware, words = client
+    killed = shlex.join(["timeout", "-s", "KILL", "4", *map(str, words)])
+    slam = create(f"{PREFIXES[middleware]}:{killed}")
+
+    def drive() -> None:
+        for frame in driven(1000):
+            slam.update(frame)
+            time.sleep(1.0 / HZ)
+
+    with pytest.raises(SlamFailedError, match="its process was ended by SIGKILL") as raised:
+        drive()
+    assert raised.value.outcome == "raised"
+
+
+def test_of_many_that_speak_only_the_first_that_makes_sense_is_believed(client, caplog):
+    middleware, words = client
+    with on(middleware) as (domain, link):
+        robot, node = Robot(link, paced=True), Node(link)
+        other = open_link(middleware, domain=domain.number, router=domain.router)
+        other.advertise(TF)
+        say = TransformMessage((MAP, ODOM, 0.0))
+        with closing(other), started(words, domain):
+            time.sleep(2.0)  # all have found each other
+            for k, frame in enumerate(driven(100)):
+                node.sent(frame.odometry, said_ns(frame.stamp_ns))
+                robot.send(frame)
+                while not node.answered():
+                    time.sleep(0.001)
+                T_first_odom = se2.between(driven(1)[0].odometry.T_odom_robot, np.zeros(3))
+                np.testing.assert_allclose(node.T_own_odom, T_first_odom, atol=1e-12)
+                if k >= 10:  # the node of the other make has spoken first
+                    off = bytes(say(frame.stamp_ns, np.full(3, 9.0)))
+                    late = bytes(say(frame.stamp_ns - 3600 * NS_PER_S, np.zeros(3)))
+                    for data in (off, late, off[:40]):
+                        other.publish(TF, data)
+            time.sleep(0.5)
+            node.answered()
+    assert node.odd.pop("clock_off_s") == pytest.approx(-3600.0, abs=10.0)
+    torn = 90 if middleware == "zenoh" else 0  # Cyclone DDS itself leaves them out
+    assert node.odd == {"from_others": 90} | ({"malformed": torn} if torn else {})
+    assert "a second node states map -> odom" in caplog.text
+
+
+@pytest.fixture
+def cable(monkeypatch) -> Iterator[tuple[list[str], str, Callable[[str], None]]]:
+    """A network namespace: words that start a program in it, our address, and a switch."""
+    pid = os.getpid()
+    space, ours, theirs = f"mobilia{pid}", f"mob{pid}a", f"mob{pid}b"
+    inside = ["ip", "netns", "exec", space]
+    if (
+        os.geteuid()
+        or not shutil.which("ip")
+        or subprocess.run(["ip", "netns", "add", space]).returncode
+    ):
+        pytest.skip("needs ip netns, and to be root")
+    here, there = f"10.213.{pid % 256}.1", f"10.213.{pid % 256}.2"
+    for line in (
+        f"ip link add {ours} type veth peer name {theirs} netns {space}",
+        f"ip addr add {here}/24 dev {ours}", f"ip link set {ours} up",
+        *(" ".join([*inside, "ip", words]) for words in (
+            f"addr add {there}/24 dev {theirs}", f"link set {theirs} up", "link set lo up",
+        )),
+    ):  # fmt: skip
+        subprocess.run(line.split(), check=True)
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    monkeypatch.setenv("CYCLONEDDS_URI", (
+        "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='"
+        f"{here}'/></Interfaces></General></Domain></CycloneDDS>"
+    ))  # fmt: skip
+    monkeypatch.setenv("NODE_IP", there)
+    monkeypatch.setenv("ROBOT_IP", here)
+    yield inside, here, lambda how: subprocess.run(["ip", "link", "set", ours, how], check=True)
+    subprocess.run(["ip", "netns", "del", space], check=True)
+
+
+def test_a_cut_of_five_seconds_holds_nothing_up_and_scans_flow_again(client, cable, monkeypatch):
+    (middleware, words), (inside, here, switch) = client, cable
+    with on(middleware) as (domain, link):
+        monkeypatch.setattr(type(domain), "environment", lambda domain: {
+            "ROS_DOMAIN_ID": str(domain.number),
+            "ZENOH_CONFIG_OVERRIDE": f'connect/endpoints=["tcp/{here}:{domain.router}"]',
+        })  # fmt: skip
+        link.subscribe(ANSWERS)
+        robot = Robot(link)
+        with started([*inside, *words], domain):
+            while not link.listeners(robot.topics["/scan"]):
+                time.sleep(0.02)
+            time.sleep(2.0)
+            frames, sent, came = driven(round(HZ * (CUT_S + 13.0))), {}, {}
+            down, up = round(HZ * 3.0), round(HZ * (3.0 + CUT_S))
+            began_s = time.monotonic()
+            for k, frame in enumerate(frames):
+                time.sleep(max(0.0, began_s + k / HZ - time.monotonic()))
+                if k in (down, up):
+                    switch("down" if k == down else "up")
+                robot.send(frame)
+                sent[said_ns(frame.stamp_ns)] = time.monotonic()
+                for taken in link.take(ANSWERS):
+                    stamp_ns = transform_of(decoded(TF.kind, taken.data), MAP, ODOM).stamp_ns
+                    came[stamp_ns] = time.monotonic()
+    stamps = list(sent)
+    answered = [sum(s in came for s in part) for part in (stamps[:down], stamps[up:])]
+    up_s = sent[stamps[up]]
+    back_s = min((came[s] - up_s for s in stamps[up:] if s in came), default=np.inf)
+    late_s = float(np.diff(list(sent.values())).max())
+    print(
+        f"{middleware}: of {down} scans before the cut {answered[0]} answered, of "
+        f"{len(stamps) - up} after it {answered[1]}; back {back_s:.2f} s after the cable; "
+        f"longest time between two frames {late_s:.2f} s"
+    )
+    assert answered[0] >= 0.9 * down
+    assert stamps[-5] in came
+    assert late_s < CUT_S / 2  # the world goes on
