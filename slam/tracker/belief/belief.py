@@ -109,6 +109,9 @@ class Belief:
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot)
         odd = self._suspect or self._usual.is_odd(match, observations)
+        if self._odds.asked and self._agreement.dragged(observations.mean_vote) > 0.5:
+            pose = self._undragged(match)
+            match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
         episode = self._begun(cell_map, observations, prediction, match)
@@ -268,12 +271,25 @@ class Belief:
             self._note_break(episode, observations, prediction, found)
             self._usual.follow(found, observations, prediction.elapsed)
             self._agreement.take(prediction, found.T_map_robot)
-            episode.matched = goes_on
-            match = found if goes_on else replace(match, matched=found.matched)
+            # what the map confirmed in the scan before was not all hidden
+            dragged = (
+                episode.evidence.latest_m < self._config.confirmed_m
+                and self._agreement.dragged(observations.mean_vote) > 0.5
+            )
+            episode.matched = goes_on and not dragged
+            match = found if episode.matched else replace(match, matched=found.matched)
+            if dragged:
+                match = replace(match, T_map_robot=self._undragged(found))
         episode.before = episode.evidence.copy()
         episode.evidence.add(cell_map, observations, match.T_map_robot)
         episode.match = match
         return match
+
+    def _undragged(self, match: Match) -> Float:
+        """Where odometry leads, (3,): movers rather carried the matches off from there."""
+        pose = self._agreement.undragged(match.T_map_robot)
+        self._agreement.forget()
+        return pose
 
     def _weigh(self, episode: Episode) -> None:
         self._weighed = episode.weighed()

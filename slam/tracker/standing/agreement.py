@@ -75,6 +75,12 @@ class Agreement:
         nats = min(1.5 * (self.ratio - self._config.disagreed), 50.0)  # of 3 numbers: 3 / 2
         return (1.0 - vote) / (1.0 + math.exp(-nats))
 
+    def undragged(self, T_map_robot: Float) -> Float:
+        """(3,) the pose without what matches corrected: where odometry leads."""
+        pose: Float = T_map_robot - np.array(self._sums[self._worst])
+        pose[2] = se2.wrap(float(pose[2]))
+        return pose
+
     def covariance(self, dragged: float) -> Float:
         """(3, 3) of the pose if that is its probability: the pose is right, or off by S.
 

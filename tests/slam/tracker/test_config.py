@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("9cb2409eed68", "c5e018a797e0")),
-        (OccupancyConfig, ["grid"], ("3eb16fbbce39", "3066e4b8c574")),
+        (ShuntingConfig, [], ("c5e096b75d58", "47d2beb86ea3")),
+        (OccupancyConfig, ["grid"], ("f42399ccfb15", "a984a670a6c5")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

@@ -245,3 +245,19 @@ def test_what_the_local_copy_sees_is_not_in_the_map(kind: type[Tracker]) -> None
     for one, other in zip(before, system.cell_map.cells, strict=True):
         np.testing.assert_array_equal(one, other)
     assert not np.array_equal(episode.local.cells.y, system.cell_map.cells.y)
+
+
+def test_a_false_alarm_that_movers_carried_the_matches_off_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is taken back to where odometry leads, and the map says in the same scan where it is."""
+    system, last = mapped(ROOMS)
+    pose = at(system)
+    stream = going_on(still(ROOMS, pose, 2.0), last)
+    with monkeypatch.context() as patched:
+        patched.setattr(system._agreement, "dragged", lambda vote: 0.9)
+        patched.setattr(system._agreement, "undragged", lambda T: T + np.array([0.15, 0.0, 0.0]))
+        said = told(system, stream[:1])
+    said += told(system, stream[1:])
+    assert max(off_m(one, pose) for one in said) < 0.02
+    assert said[-1].converged
