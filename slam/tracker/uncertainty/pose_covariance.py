@@ -177,5 +177,5 @@ class PoseCovariance:
 
 
 def _far(covariance: Float) -> float:
-    """m, deviation of a position."""
-    return math.sqrt(float(covariance[0, 0] + covariance[1, 1]))
+    """m, deviation of a position; rounding may leave a little less than nothing of it."""
+    return math.sqrt(max(float(covariance[0, 0] + covariance[1, 1]), 0.0))
