@@ -107,7 +107,7 @@ class Belief:
         if self._episode is not None:
             return self._go_on(self._episode, cell_map, T_map_before, observations, prediction)
         match = near(self._match(observations, prediction, cell_map), prediction)
-        self._agreement.take(prediction, match.T_map_robot)
+        self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
         if self._odds.asked and self._agreement.dragged(observations.mean_vote) > 0.5:
             pose = self._undragged(match)
@@ -270,7 +270,7 @@ class Belief:
             goes_on = self._usual.share(found, observations) >= self._config.breaks
             self._note_break(episode, observations, prediction, found)
             self._usual.follow(found, observations, prediction.elapsed)
-            self._agreement.take(prediction, found.T_map_robot)
+            self._agreement.take(prediction, found.T_map_robot, observations.mean_vote)
             # what the map confirmed in the scan before was not all hidden
             dragged = (
                 episode.evidence.latest_m < self._config.confirmed_m

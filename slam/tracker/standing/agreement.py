@@ -20,9 +20,10 @@ from slam.tracker.standing.config import StandingConfig
 class Agreement:
     """Sums of what matches corrected, over two windows, against what odometry may be off.
 
-    A window of w s forgets with exp(-t / w): S is the sum of corrections, V that of odometry's
-    covariances. With R, what a match itself may be off, S' (V + R)^-1 S / 3 is about 1 where all
-    is well.
+    A window of w s forgets with exp(-t / w): S is the sum of corrections c, V that of odometry's
+    covariances and of v^4 c c'. With nearly all returns of weight (mean vote v about 1) a
+    correction is odometry's own error, however rare one so large is. With R, what a match itself
+    may be off, S' (V + R)^-1 S / 3 is at most about 1 where all is well.
 
     ratio  the larger one of the two windows
     """
@@ -42,12 +43,17 @@ class Agreement:
         self._worst = 0
         self._elapsed_s = 0.0
 
-    def take(self, prediction: Prediction, T_map_robot: Float) -> None:
-        """The robot is matched to ``T_map_robot``."""
+    def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
+        """The robot is matched to ``T_map_robot`` by returns of that mean vote."""
         off = (T_map_robot - prediction.T_map_robot).tolist()
         off[2] = se2.wrap(off[2])
         (xx, xy, xt), (_, yy, yt), (_, _, tt) = prediction.covariance.tolist()
-        more = xx, xy, xt, yy, yt, tt
+        x, y, t = off
+        w = vote * vote * vote * vote
+        more = (
+            xx + w * x * x, xy + w * x * y, xt + w * x * t,
+            yy + w * y * y, yt + w * y * t, tt + w * t * t,
+        )  # fmt: skip
         self.ratio, self._elapsed_s = 0.0, prediction.elapsed
         for k, window in enumerate(self._windows):
             keep = math.exp(-prediction.elapsed / window)
