@@ -42,6 +42,7 @@ class Agreement:
         self.ratio = 0.0
         self._worst = 0
         self._elapsed_s = 0.0
+        self._put_back: Float = np.zeros((3, 3))
 
     def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
         """The robot is matched to ``T_map_robot`` by returns of that mean vote."""
@@ -81,10 +82,18 @@ class Agreement:
         nats = min(1.5 * (self.ratio - self._config.disagreed), 50.0)  # of 3 numbers: 3 / 2
         return (1.0 - vote) / (1.0 + math.exp(-nats))
 
-    def undragged(self, T_map_robot: Float) -> Float:
-        """(3,) the pose without what matches corrected: where odometry leads."""
+    def undragged(self, T_map_robot: Float, vote: float) -> Float:
+        """(3,) the pose without what matches corrected: where odometry leads.
+
+        The sums begin anew. With the rest of the probability the matches were right: the pose is
+        off by S now, and ``left_behind`` says so.
+        """
         pose: Float = T_map_robot - np.array(self._sums[self._worst])
         pose[2] = se2.wrap(float(pose[2]))
+        dragged = self.dragged(vote)
+        put_back = self.covariance(dragged * (1.0 - dragged))
+        self.forget()
+        self._put_back = put_back
         return pose
 
     def covariance(self, dragged: float) -> Float:
@@ -97,6 +106,11 @@ class Agreement:
         return dragged * np.array(rows)
 
     def left_behind(self, dragged: float) -> Float:
-        """(3, 3) the part of that which the window is about to forget: the map's from now on."""
+        """(3, 3) the part of that which the window is about to forget: the map's from now on.
+
+        What a pose put back leaves is in it. It is handed over once, until the next match.
+        """
         keep = math.exp(-self._elapsed_s / self._windows[self._worst])
-        return (1.0 - keep * keep) * self.covariance(dragged)
+        left = (1.0 - keep * keep) * self.covariance(dragged) + self._put_back
+        self._elapsed_s, self._put_back = 0.0, np.zeros((3, 3))
+        return left

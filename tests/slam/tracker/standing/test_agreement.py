@@ -116,6 +116,17 @@ def test_what_the_window_forgets_stays_in_the_map() -> None:
     assert left_behind == pytest.approx(whole, rel=1e-6, abs=1e-15)
 
 
+def test_a_pose_that_was_put_back_may_have_been_right() -> None:
+    """Off by the whole sum with the rest of the probability, said once; the sums begin anew."""
+    agreement = fed(np.tile([SIGMA[0], 0.0, 0.0], (50, 1)))
+    p, spread = agreement.dragged(0.4), agreement.covariance(1.0)
+    pose = agreement.undragged(np.zeros(3), 0.4)
+    assert pose[0] ** 2 == pytest.approx(spread[0, 0])
+    assert agreement.left_behind(0.0) == pytest.approx(p * (1.0 - p) * spread)
+    assert not agreement.left_behind(0.0).any()
+    assert agreement.ratio == 0.0
+
+
 def test_a_robot_that_was_set_elsewhere_starts_anew() -> None:
     agreement = fed(np.tile([0.05, 0.0, 0.0], (20, 1)))
     assert agreement.ratio > 10.0
