@@ -57,6 +57,7 @@ class TrackerConfig(Settings):
         "freeze_below": "carried_per_h",
         "tracking.freeze_below": "carried_per_h",
         "tracking.quality.give_up_s": "tracking.give_up_s",
+        "standing.doubtful_m": "standing.alert_m",
     }
     constants: ClassVar[Mapping[str, str]] = {
         "frontend": "slam.frontend.observations",

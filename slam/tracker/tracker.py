@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import abc
+import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -24,7 +25,7 @@ from slam.path import PosePath
 from slam.tracker import map_file as memory
 from slam.tracker.belief.belief import Belief, Judged
 from slam.tracker.belief.places import coarse
-from slam.tracker.belief.status import State
+from slam.tracker.belief.status import State, Status
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.learnt_ranges import LearntRanges
@@ -223,20 +224,17 @@ class Tracker(abc.ABC):
         match, prediction = judged.match, judged.prediction
         tracked = judged.state is State.TRACKING and not match.slipped
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
-        self._dragged = 0.0
-        if tracked:
-            self._dragged = self._agreement.dragged(self._vote)
-            left_behind = self._agreement.left_behind(self._dragged)
-            self._pose_covariance.dragged(left_behind, self._agreement.covariance(self._dragged))
-            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
-            return
+        self._dragged = 0.0 if match.slipped else self._agreement.dragged(self._vote)
         if match.slipped:  # found by a search, among what does not fit there
             found = (1.0 - match.overlapped) * coarse(self._numbers.relocalise)
             self._pose_covariance.dragged(found)
         else:
-            dragged = self._agreement.dragged(self._vote)
-            self._pose_covariance.dragged(self._agreement.covariance(dragged))
-        self._odometry_noise.skip()
+            left_behind = self._agreement.left_behind(self._dragged)
+            self._pose_covariance.dragged(left_behind, self._agreement.covariance(self._dragged))
+        if tracked:
+            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
+        else:
+            self._odometry_noise.skip()
 
     def _add_to_path(self, observations: Observations, judged: Judged) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is uncertain."""
@@ -270,6 +268,9 @@ class Tracker(abc.ABC):
         self._before = frame.odometry
         self._T_map_robot = match.T_map_robot
         T_map_robot = match.T_map_robot if elsewhere is None else elsewhere
+        p_lost = 1.0 - (1.0 - self._belief.p_lost) * (1.0 - self._p_off())
+        sees = self._belief.status is not Status.BLIND
+        status = Status.LOST if p_lost >= 0.5 and sees else self._belief.status
         self._path.add(frame.stamp_ns, match.T_map_robot, elsewhere)
         return Estimate(
             stamp_ns=frame.stamp_ns,
@@ -286,8 +287,8 @@ class Tracker(abc.ABC):
                 "nis": self._odometry_noise.nis,
                 "trust": self._vote * (1.0 - self._dragged),
                 "odometry_ratio": self._agreement.ratio,
-                "verdict": self._belief.status.value,
-                "p_lost": self._belief.p_lost,
+                "verdict": status.value,
+                "p_lost": p_lost,
                 "correction": self._corrected_by.tolist(),
                 "T_map_odom": self._T_map_odom.tolist(),
             },
@@ -298,10 +299,14 @@ class Tracker(abc.ABC):
         covariance = self._pose_covariance.covariance
         return covariance + self._belief.spread_about(T_map_robot, self._loops.anywhere)
 
+    def _p_off(self) -> float:
+        """Probability that movers carried map and robot off by more than the limit (Rayleigh)."""
+        alert_m, by_m = self.config.standing.alert_m, self._pose_covariance.by_movers_m
+        return math.exp(-((alert_m / by_m) ** 2)) if min(alert_m, by_m) > 0.0 else 0.0
+
     def _doubtful(self) -> bool:
-        """Whether the crowd may have carried the robot far."""
-        doubtful_m = self.config.standing.doubtful_m
-        return 0.0 < doubtful_m < self._agreement.off_m(self._dragged)
+        """Whether three times that deviation is beyond the limit."""
+        return 0.0 < self.config.standing.alert_m < 3.0 * self._pose_covariance.by_movers_m
 
     @property
     def learnt_error(self) -> RangeError | None:

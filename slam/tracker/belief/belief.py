@@ -107,10 +107,10 @@ class Belief:
         if self._episode is not None:
             return self._go_on(self._episode, cell_map, T_map_before, observations, prediction)
         match = near(self._match(observations, prediction, cell_map), prediction)
-        self._agreement.take(prediction, match.T_map_robot)
+        self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
         if self._odds.asked and self._agreement.dragged(observations.mean_vote) > 0.5:
-            pose = self._undragged(match)
+            pose = self._agreement.undragged(match.T_map_robot, observations.mean_vote)
             match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
@@ -270,7 +270,7 @@ class Belief:
             goes_on = self._usual.share(found, observations) >= self._config.breaks
             self._note_break(episode, observations, prediction, found)
             self._usual.follow(found, observations, prediction.elapsed)
-            self._agreement.take(prediction, found.T_map_robot)
+            self._agreement.take(prediction, found.T_map_robot, observations.mean_vote)
             # what the map confirmed in the scan before was not all hidden
             dragged = (
                 episode.evidence.latest_m < self._config.confirmed_m
@@ -279,17 +279,12 @@ class Belief:
             episode.matched = goes_on and not dragged
             match = found if episode.matched else replace(match, matched=found.matched)
             if dragged:
-                match = replace(match, T_map_robot=self._undragged(found))
+                pose = self._agreement.undragged(found.T_map_robot, observations.mean_vote)
+                match = replace(match, T_map_robot=pose)
         episode.before = episode.evidence.copy()
         episode.evidence.add(cell_map, observations, match.T_map_robot)
         episode.match = match
         return match
-
-    def _undragged(self, match: Match) -> Float:
-        """Where odometry leads, (3,): movers rather carried the matches off from there."""
-        pose = self._agreement.undragged(match.T_map_robot)
-        self._agreement.forget()
-        return pose
 
     def _weigh(self, episode: Episode) -> None:
         self._weighed = episode.weighed()

@@ -20,9 +20,10 @@ from slam.tracker.standing.config import StandingConfig
 class Agreement:
     """Sums of what matches corrected, over two windows, against what odometry may be off.
 
-    A window of w s forgets with exp(-t / w): S is the sum of corrections, V that of odometry's
-    covariances. With R, what a match itself may be off, S' (V + R)^-1 S / 3 is about 1 where all
-    is well.
+    A window of w s forgets with exp(-t / w): S is the sum of corrections c, V that of odometry's
+    covariances and of v^4 c c'. With nearly all returns of weight (mean vote v about 1) a
+    correction is odometry's own error, however rare one so large is. With R, what a match itself
+    may be off, S' (V + R)^-1 S / 3 is at most about 1 where all is well.
 
     ratio  the larger one of the two windows
     """
@@ -41,13 +42,19 @@ class Agreement:
         self.ratio = 0.0
         self._worst = 0
         self._elapsed_s = 0.0
+        self._put_back: Float = np.zeros((3, 3))
 
-    def take(self, prediction: Prediction, T_map_robot: Float) -> None:
-        """The robot is matched to ``T_map_robot``."""
+    def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
+        """The robot is matched to ``T_map_robot`` by returns of that mean vote."""
         off = (T_map_robot - prediction.T_map_robot).tolist()
         off[2] = se2.wrap(off[2])
         (xx, xy, xt), (_, yy, yt), (_, _, tt) = prediction.covariance.tolist()
-        more = xx, xy, xt, yy, yt, tt
+        x, y, t = off
+        w = vote * vote * vote * vote
+        more = (
+            xx + w * x * x, xy + w * x * y, xt + w * x * t,
+            yy + w * y * y, yt + w * y * t, tt + w * t * t,
+        )  # fmt: skip
         self.ratio, self._elapsed_s = 0.0, prediction.elapsed
         for k, window in enumerate(self._windows):
             keep = math.exp(-prediction.elapsed / window)
@@ -75,10 +82,18 @@ class Agreement:
         nats = min(1.5 * (self.ratio - self._config.disagreed), 50.0)  # of 3 numbers: 3 / 2
         return (1.0 - vote) / (1.0 + math.exp(-nats))
 
-    def undragged(self, T_map_robot: Float) -> Float:
-        """(3,) the pose without what matches corrected: where odometry leads."""
+    def undragged(self, T_map_robot: Float, vote: float) -> Float:
+        """(3,) the pose without what matches corrected: where odometry leads.
+
+        The sums begin anew. With the rest of the probability the matches were right: the pose is
+        off by S now, and ``left_behind`` says so.
+        """
         pose: Float = T_map_robot - np.array(self._sums[self._worst])
         pose[2] = se2.wrap(float(pose[2]))
+        dragged = self.dragged(vote)
+        put_back = self.covariance(dragged * (1.0 - dragged))
+        self.forget()
+        self._put_back = put_back
         return pose
 
     def covariance(self, dragged: float) -> Float:
@@ -91,11 +106,11 @@ class Agreement:
         return dragged * np.array(rows)
 
     def left_behind(self, dragged: float) -> Float:
-        """(3, 3) the part of that which the window is about to forget: the map's from now on."""
-        keep = math.exp(-self._elapsed_s / self._windows[self._worst])
-        return (1.0 - keep * keep) * self.covariance(dragged)
+        """(3, 3) the part of that which the window is about to forget: the map's from now on.
 
-    def off_m(self, dragged: float) -> float:
-        """m, deviation of the position by that."""
-        x, y, _ = self._sums[self._worst]
-        return math.sqrt(dragged) * math.hypot(x, y)
+        What a pose put back leaves is in it. It is handed over once, until the next match.
+        """
+        keep = math.exp(-self._elapsed_s / self._windows[self._worst])
+        left = (1.0 - keep * keep) * self.covariance(dragged) + self._put_back
+        self._elapsed_s, self._put_back = 0.0, np.zeros((3, 3))
+        return left

@@ -56,9 +56,10 @@ class StandingConfig(Settings):
     long_window_s: float = number(8.0, "s", "and over it", SEEDS, low=1e-3)
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
-    doubtful_m: float = number(
-        0.15, "m", "deviation by drift that movers cause: not converged; 0: never", SEEDS
-    )
+    alert_m: float = number(
+        0.5, "m", "a position off by more is wrong: not converged where movers may have carried "
+        "it so far, by 3 σ; 0: never asked", "the alert limit of docs/integrity.md",
+    )  # fmt: skip
 
 
 ALL_VOTE = StandingConfig(settled_s=0.0, disagreed=0.0)  # every return

@@ -33,6 +33,7 @@ class PoseCovariance:
 
     covariance    (3, 3) of (x, y, theta) in the map frame; zero at the known start
     newest_drift  (3, 3) what the latest frame added to the error of the map
+    by_movers_m   deviation of the position by what movers may have carried map and robot off
     unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
                   the noise of their beams would
     along_rad     direction in the map of the one that is not observable, None unless it is one
@@ -55,6 +56,8 @@ class PoseCovariance:
         self._drift: Float = np.zeros((3, 3))
         self._blind: Float = np.zeros((3, 3))
         self._shared: Float = np.zeros((3, 3))
+        self._by_movers: Float = np.zeros((3, 3))
+        self.by_movers_m = 0.0
 
     @property
     def shared_m2(self) -> float:
@@ -66,6 +69,7 @@ class PoseCovariance:
     def relocated(self, covariance: Float) -> None:
         """Found again somewhere in the map, to within ``covariance`` (3, 3)."""
         self._blind = covariance.copy()
+        self._by_movers = np.zeros((3, 3))
 
     def resumed(self, covariance: Float) -> None:
         """Going on in a map of before, which is off by ``covariance`` (3, 3) as a whole."""
@@ -76,6 +80,8 @@ class PoseCovariance:
         """A loop says that the map in view is off by ``covariance`` (3, 3), and no more."""
         self._drift = covariance.copy()
         self.covariance = self._drift + self._blind + self._shared
+        if _far(covariance) < _far(self._by_movers):
+            self._by_movers = covariance.copy()
 
     def odometry_part(self, motion: Float) -> Float:
         """Covariance (3, 3), after ``motion`` in the map, of odometry's own part of late.
@@ -140,13 +146,16 @@ class PoseCovariance:
         self._drift = self._drift + covariance
         self.newest_drift = self.newest_drift + covariance
         self.covariance = self.covariance + covariance
+        self._by_movers = self._by_movers + covariance
         if now is not None:
             self.covariance = self.covariance + now
+        self.by_movers_m = _far(self._by_movers if now is None else self._by_movers + now)
 
     def turned(self, by: float) -> None:
         """The map frame was turned by ``by`` rad, and the robot with it."""
         self._drift, self._blind = turned(self._drift, by), turned(self._blind, by)
         self._shared, self._geometry = turned(self._shared, by), turned(self._geometry, by)
+        self._by_movers = turned(self._by_movers, by)
         self.covariance = self._drift + self._blind + self._shared
 
     def _fewer(self) -> float:
@@ -165,3 +174,8 @@ class PoseCovariance:
         self._weighed = keep * self._weighed + evidence.weighed
         self._in_view = keep * self._in_view + evidence.in_view
         self._looks = keep * self._looks + 1.0
+
+
+def _far(covariance: Float) -> float:
+    """m, deviation of a position; rounding may leave a little less than nothing of it."""
+    return math.sqrt(max(float(covariance[0, 0] + covariance[1, 1]), 0.0))

@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("1a3765784250", "fee739d1b819")),
-        (OccupancyConfig, ["grid"], ("15c4b126e7e0", "52594c6f1c38")),
+        (ShuntingConfig, [], ("c5e096b75d58", "47d2beb86ea3")),
+        (OccupancyConfig, ["grid"], ("f42399ccfb15", "a984a670a6c5")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
@@ -38,6 +38,7 @@ def test_a_tree_keeps_its_paths_its_order_and_its_digest(
         ("freeze_below", "carried_per_h"),
         ("tracking.freeze_below", "carried_per_h"),
         ("tracking.quality.give_up_s", "tracking.give_up_s"),
+        ("standing.doubtful_m", "standing.alert_m"),
     ],
 )
 def test_a_number_that_is_gone_is_refused_by_the_name_of_what_took_its_place(

@@ -256,7 +256,7 @@ def test_a_false_alarm_that_movers_carried_the_matches_off_changes_nothing(
     stream = going_on(still(ROOMS, pose, 2.0), last)
     with monkeypatch.context() as patched:
         patched.setattr(system._agreement, "dragged", lambda vote: 0.9)
-        patched.setattr(system._agreement, "undragged", lambda T: T + np.array([0.15, 0.0, 0.0]))
+        patched.setattr(system._agreement, "undragged", lambda T, _: T + np.array([0.15, 0.0, 0.0]))
         said = told(system, stream[:1])
     said += told(system, stream[1:])
     assert max(off_m(one, pose) for one in said) < 0.02

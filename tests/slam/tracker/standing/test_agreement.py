@@ -19,15 +19,15 @@ SIGMA = np.array([0.003, 0.003, 0.003])  # of one step of odometry: m, m, rad
 STEP_S = 0.2
 
 
-def fed(corrections: Array, config: StandingConfig = NUMBERS) -> Agreement:
-    """After so many matches, each off its prediction by a row."""
+def fed(corrections: Array, config: StandingConfig = NUMBERS, vote: float = 0.0) -> Agreement:
+    """After so many matches by returns of that vote, each off its prediction by a row."""
     agreement = Agreement(config)
     for off in corrections:
         prediction = Prediction(
             T_map_robot=np.zeros(3), increment=np.zeros(3), covariance=np.diag(SIGMA**2),
             twist=np.zeros(3), elapsed=STEP_S,
         )  # fmt: skip
-        agreement.take(prediction, off)
+        agreement.take(prediction, off, vote)
     return agreement
 
 
@@ -50,6 +50,23 @@ def test_small_corrections_to_one_side_add_up() -> None:
         expected.append(S * S / (V + NUMBERS.match_m**2) / 3.0)
     assert agreement.ratio == pytest.approx(max(expected), rel=1e-9)
     assert agreement.ratio > 4.0
+
+
+def test_a_rare_large_correction_among_returns_of_weight_is_odometrys_own() -> None:
+    """Heavy tails: one or some of 30 sigma, to either side; 1/3 of as many as a window holds."""
+    rows = np.zeros((20, 3))
+    rows[-1] = 30.0 * SIGMA
+    assert fed(rows, vote=1.0).ratio < 1.0 / 3.0
+    assert fed(rows, vote=0.0).ratio > 100.0
+    rng = np.random.default_rng(5)
+    heavy = [rng.standard_t(1.5, (100, 3)) * SIGMA for _ in range(40)]
+    usual = [fed(one, vote=1.0).ratio for one in heavy]
+    assert np.mean([fed(one).ratio for one in heavy]) > NUMBERS.disagreed
+    assert max(usual) < NUMBERS.disagreed
+
+
+def test_a_steady_drift_disagrees_also_among_returns_of_weight() -> None:
+    assert fed(np.tile([0.5 * SIGMA[0], 0.0, 0.0], (200, 1)), vote=0.9).ratio > NUMBERS.disagreed
 
 
 def test_only_among_what_has_no_vote_are_the_matches_blamed() -> None:
@@ -76,7 +93,9 @@ def test_the_spread_of_both_explanations_is_the_share_of_the_sum_squared() -> No
     agreement = fed(np.tile([SIGMA[0], -SIGMA[1], 0.0], (100, 1)))
     p = agreement.dragged(0.2)
     spread = agreement.covariance(p)
-    assert spread[0, 0] + spread[1, 1] == pytest.approx(agreement.off_m(p) ** 2, rel=1e-9)
+    assert spread == pytest.approx(
+        p * np.outer(agreement._sums[0], agreement._sums[0]), rel=1e-9
+    ) or (spread == pytest.approx(p * np.outer(agreement._sums[1], agreement._sums[1]), rel=1e-9))
     assert spread[0, 1] == pytest.approx(-spread[0, 0], rel=1e-9)
     assert np.linalg.eigvalsh(spread).min() > -1e-15
 
@@ -92,9 +111,20 @@ def test_what_the_window_forgets_stays_in_the_map() -> None:
             twist=np.zeros(3), elapsed=STEP_S,
         )  # fmt: skip
         worst = agreement._worst
-        agreement.take(prediction, np.zeros(3))
+        agreement.take(prediction, np.zeros(3), 0.0)
         agreement._worst = worst
     assert left_behind == pytest.approx(whole, rel=1e-6, abs=1e-15)
+
+
+def test_a_pose_that_was_put_back_may_have_been_right() -> None:
+    """Off by the whole sum with the rest of the probability, said once; the sums begin anew."""
+    agreement = fed(np.tile([SIGMA[0], 0.0, 0.0], (50, 1)))
+    p, spread = agreement.dragged(0.4), agreement.covariance(1.0)
+    pose = agreement.undragged(np.zeros(3), 0.4)
+    assert pose[0] ** 2 == pytest.approx(spread[0, 0])
+    assert agreement.left_behind(0.0) == pytest.approx(p * (1.0 - p) * spread)
+    assert not agreement.left_behind(0.0).any()
+    assert agreement.ratio == 0.0
 
 
 def test_a_robot_that_was_set_elsewhere_starts_anew() -> None:
@@ -102,4 +132,4 @@ def test_a_robot_that_was_set_elsewhere_starts_anew() -> None:
     assert agreement.ratio > 10.0
     agreement.forget()
     assert agreement.ratio == 0.0
-    assert agreement.off_m(1.0) == 0.0
+    assert not agreement.covariance(1.0).any()

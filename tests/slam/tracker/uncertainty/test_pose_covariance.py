@@ -350,3 +350,35 @@ def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
         pose_covariance.update(T, still, match, nothing)
     assert np.isfinite(pose_covariance.covariance).all()
     assert pose_covariance.shared_m2 < 1e-4
+
+
+def test_what_movers_carried_off_adds_up_until_a_loop_or_another_place_says_better() -> None:
+    pose = PoseCovariance(CONFIG)
+    part = np.diag([0.0009, 0.0016, 0.0])
+    for _ in range(4):
+        pose.dragged(part, 0.5 * part)
+    # the newest part is of the pose alone, and is not kept
+    assert pose.by_movers_m == pytest.approx(0.05 * math.sqrt(4.5))
+    pose.known(np.diag([0.0018, 0.0032, 0.0]))
+    pose.dragged(np.zeros((3, 3)))
+    assert pose.by_movers_m == pytest.approx(0.05 * math.sqrt(2.0))
+    pose.known(np.eye(3))  # a loop that says less
+    pose.dragged(np.zeros((3, 3)))
+    assert pose.by_movers_m == pytest.approx(0.05 * math.sqrt(2.0))
+    pose.relocated(np.eye(3))
+    pose.dragged(np.zeros((3, 3)))
+    assert pose.by_movers_m == 0.0
+
+
+def test_a_pose_that_movers_may_have_carried_beyond_the_alert_limit_is_not_believed() -> None:
+    stream = frames(World2D(arena()), Drive((0.0, 0.0, 0.0), ((0.0, 0.0, 1.0),)), rate_hz=5.0)
+    system, limit_m = ShuntingSlam(CONFIG), CONFIG.standing.alert_m
+    for frame in stream[:-2]:
+        assert system.update(frame.without_truth()).converged
+    system._pose_covariance.dragged(np.diag([(limit_m / 3.1) ** 2, 0.0, 0.0]))
+    assert system.update(stream[-2].without_truth()).converged
+    system._pose_covariance.dragged(np.diag([limit_m**2, 0.0, 0.0]))
+    said = system.update(stream[-1].without_truth())
+    assert not said.converged
+    of_gaussian = math.exp(-1.0 / (1.0 + 3.1**-2))  # Rayleigh, beyond the limit
+    assert said.diagnostics["p_lost"] == pytest.approx(of_gaussian, rel=1e-3)
