@@ -47,7 +47,8 @@ def head(
 ) -> dict[str, Any]:
     """The head of the results file, with the options ``asked``; call it before anything is run.
 
-    ``mark`` names the module of ``package``, and its place in the page.
+    ``mark`` names the module of ``package``, and its place in the page. Of absolute paths the
+    command keeps the last part: where a machine keeps them helps nobody.
 
     Raises ``InvalidValueError`` where the page has no such mark, or where the project's own results
     would name a commit that is not the code here; ``OSError`` for no such page.
@@ -55,7 +56,8 @@ def head(
     if not wanted.no_page:
         filled(wanted.page.read_text(encoding="utf-8"), mark, "", wanted.page)
     own = wanted.results.resolve().parent == RESULTS
-    words = sys.argv[1:] if arguments is None else arguments
+    given = sys.argv[1:] if arguments is None else arguments
+    words = [Path(word).name if Path(word).is_absolute() else word for word in given]
     return {
         "schema": SCHEMA,
         "command": shlex.join(["python", "-m", f"{package}.{mark}", *words]),
