@@ -62,7 +62,7 @@ MAP_LEGEND = {"#800026": "stands there for long", "#fd8d3c": "seen lately, or no
 CHANGES_LEGEND = {"#238b45": "new: seen, hardly in long-term memory",
                   "#cb181d": "gone: in long-term memory, seen empty",
                   "#888": "as before"}  # fmt: skip
-_RSS_BYTES = 1 if sys.platform == "darwin" else 1024  # of ru_maxrss
+_RSS_BYTES = 1 if sys.platform == "darwin" else 1024  # bytes, unit of ru_maxrss: getrusage(2)
 Writer = Callable[[Path, Show], None]
 _files: dict[str, Writer] = {}
 
