@@ -118,6 +118,9 @@ def test_a_published_track_says_itself_whether_it_counts_and_any_other_its_oracl
     assert scores.fairness(OPEN, far)["oracle_error_m"] == 0.021
     other = scores.fairness(OPEN, [*lost, *runs("oracle(map)", KEPT)])
     assert (other["counts"], other["oracle"]) == (True, "oracle(map)")  # either may hold
+    for lost, fair in ((2, True), (3, False)):
+        table = [[0, 0, 0, 0, k < lost] for k in range(20)]
+        assert scores.fairness(OPEN, runs(ORACLE, table))["counts"] is fair
 
 
 def board(mine: list[dict], track: Track = TRACK, oracle: list[list[int]] = KEPT) -> Board:
