@@ -15,11 +15,12 @@ from scipy.stats import spearmanr
 from scripts.benchmark.tracks import Track
 from scripts.comparison.schema import FAILED
 from scripts.comparison.tables import number
+from slam.evaluation.lost import LOST_M
 from slam.evaluation.statistics import bootstrap_draws, central_interval, quantile
 from slam.frames import Float
 
 Row = dict[str, Any]
-FAIR_M = 0.02  # m of median error, up to which the oracle may be off at any level
+FAIR_M = 0.1 * LOST_M  # of median error, up to which the oracle may be off at any level
 FAIR_LOST = 0.1  # of its runs at any level, up to which the oracle may be lost: 0 of 6, 2 of 20
 TRACKING, SILENT = "error_tracking_m", "silent_share"
 DRIFT, ATE = "rpe_m_per_m", "ate_unaligned_m"
