@@ -312,7 +312,7 @@ _HARD = (
         sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 2, 4, 7, 9), **_QUIET),
     ),
     Track(
-        name="depth-camera-v1", world=2, test=FRESH, seconds=120.0,
+        name="depth-camera-v1", world=2, counts=True, test=FRESH, seconds=120.0,
         about="a depth camera in place of a scanner: a hall is rebuilt while people pass",
         scene="station", axis="boards on castors, and people who walk past or with the robot",
         says=("0 boards", *(f"{c} boards, {a + b} people" for a, b, c in _HALL)),
