@@ -233,9 +233,7 @@ class Tracker(abc.ABC):
             self._pose_covariance.dragged(left_behind, self._agreement.covariance(self._dragged))
         if tracked:
             along_rad = self._pose_covariance.along_rad
-            self._odometry_noise.learn(
-                prediction, match, observations.sensor_sigma_m, along_rad
-            )
+            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m, along_rad)
         else:
             self._odometry_noise.skip()
 

@@ -25,7 +25,9 @@ from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MASK, SHIFT, Cells
 
-SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)  # places in the sums of ``_look``
+SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(
+    8
+)  # places in the sums of ``_look``
 
 
 class Pairing(NamedTuple):
