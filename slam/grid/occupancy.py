@@ -19,6 +19,7 @@ from slam.estimate import MapSquares
 from slam.frames import Float
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.grid.config import OccupancyConfig
+from slam.shunting.map.network import Network
 from slam.system import Raster, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
@@ -33,7 +34,6 @@ from slam.tracker.cells import (
     in_reach,
 )  # fmt: skip
 from slam.tracker.tracker import Tracker
-from slam.tracker.two_memories import TwoMemories
 
 
 class Odds(NamedTuple):
@@ -241,8 +241,8 @@ class OccupancySlam(Tracker):
     def _new_map(config: OccupancyConfig) -> Grid:
         return Grid(config)
 
-    def _new_submap(self) -> TwoMemories:
-        return TwoMemories(self.config)
+    def _new_submap(self) -> Network:
+        return Network(self.config, lateral=False)
 
     def changes(self) -> None:
         """A grid has but one memory."""
