@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
-from numpy.typing import NDArray
 
 from slam import se2
 from slam.errors import InvalidValueError
@@ -19,7 +18,6 @@ from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network, lateral_mu
 from slam.tracker.rasterise import rasterise
 
-Array = NDArray[np.float64]
 ORIGIN = np.zeros(3)
 BLIND = View(math.tau / 8, np.zeros(8), np.zeros(8), 400.0, 0.0, math.inf)
 OPEN = View(math.tau / 8, np.full(8, 20.0), np.zeros(8), 20.0, 0.0, math.inf)
@@ -51,15 +49,6 @@ def activity(network: Network, x: float, y: float) -> float:
     return float(network.window(x, y, x, y)[0][0, 0])
 
 
-@pytest.mark.parametrize("decay", [0.2, 0.8, 2.0])
-@pytest.mark.parametrize("step", [0.0267, 0.2, 3.0])
-def test_constant_input_settles_at_I_over_A_plus_I(decay: float, step: float) -> None:
-    network = Network(ShuntingConfig(cell_m=0.1, decay_per_s=decay))
-    for _ in range(math.ceil(20.0 / step)):
-        look(network, point(1.05, 2.05, 0.1), step)
-    assert activity(network, 1.05, 2.05) == pytest.approx(1.0 / (decay + 1.0), rel=1e-4)
-
-
 def test_an_empty_look_decays_with_the_rate_A_whatever_the_scan_rate() -> None:
     for step in (0.01, 0.0267):
         network = Network(ShuntingConfig(cell_m=0.1))
@@ -68,15 +57,6 @@ def test_an_empty_look_decays_with_the_rate_A_whatever_the_scan_rate() -> None:
         for _ in range(round(1.0 / step)):
             look(network, None, step)
         assert activity(network, 1.05, 2.05) == pytest.approx(start * math.exp(-0.8), rel=0.02)
-
-
-def test_hidden_neurons_keep_their_memory() -> None:
-    network = Network(ShuntingConfig(cell_m=0.1))
-    look(network, point(1.05, 2.05, 0.1), 1.0)
-    before = activity(network, 1.05, 2.05)
-    for _ in range(10):
-        look(network, point(8.05, 2.05, 0.1), 1.0)
-    assert activity(network, 1.05, 2.05) == before
 
 
 def test_what_moved_fades_until_its_block_dies() -> None:
@@ -129,14 +109,6 @@ def test_repeated_inspiration_keeps_a_bell_shape() -> None:
     assert int(row.argmax()) == 4
     assert (np.diff(row[:5]) >= 0.0).all()
     assert (np.diff(row[4:]) <= 0.0).all()
-
-
-def test_higher_existence_gives_higher_activity() -> None:
-    often, seldom = (Network(ShuntingConfig(cell_m=0.1)) for _ in range(2))
-    for k in range(30):
-        look(often, point(1.05, 2.05, 0.1), 0.2)
-        look(seldom, point(1.05, 2.05, 0.1) if k % 3 == 0 else None, 0.2)
-    assert activity(often, 1.05, 2.05) > activity(seldom, 1.05, 2.05)
 
 
 def test_lateral_weights_are_symmetric_and_sum_to_W() -> None:

@@ -161,14 +161,6 @@ def test_equilibrium_and_rise_of_every_strength(strength: float, expected: float
     assert x[3, 3] == pytest.approx(expected, abs=6e-4)
 
 
-def test_half_of_what_is_seen_empty_is_forgotten_in_ln_2_over_A() -> None:
-    network = started(plain(), np.full((COUNT, COUNT), 0.5))
-    step = 0.005
-    for _ in range(round(math.log(2.0) / 0.8 / step)):
-        x = inspired(network, np.zeros((COUNT, COUNT)), step)
-    np.testing.assert_allclose(x, 0.25, rtol=0.003)
-
-
 @settings(max_examples=25, deadline=None)
 @given(
     seed=st.integers(0, 2**32 - 1),
@@ -222,21 +214,6 @@ def test_confidence_rises_when_a_loop_closes() -> None:
     inspired(network, field, 0.1)
     for before, after in zip(first, network.window(0.5 * CELL, 0.5 * CELL, 1.0, 1.0), strict=True):
         assert (after > before).all()
-
-
-def test_the_weight_from_i_to_j_is_that_from_j_to_i() -> None:
-    """What one active neuron does to another is what the other would do to it."""
-    config = plain(lateral_sum=0.6, lateral_reach_cells=2.5, threshold=2e-3)
-
-    def felt(source: tuple[int, int], target: tuple[int, int]) -> float:
-        x, field = np.zeros((COUNT, COUNT)), np.zeros((COUNT, COUNT))
-        x[source], field[target] = 0.8, 1e-3
-        return float(inspired(started(config, x), field, 1.0, BLIND)[target])
-
-    for i, j in (((5, 5), (5, 6)), ((5, 5), (6, 6)), ((7, 7), (8, 9)), ((3, 8), (3, 7))):
-        assert felt(i, j) == felt(j, i)
-        assert felt(i, j) > config.threshold
-    assert felt((5, 5), (5, 8)) == 0.0  # out of reach, and too faint by itself
 
 
 def test_the_slope_of_the_energy_is_minus_b() -> None:
