@@ -41,7 +41,9 @@ def joined(raster: Raster, n: int, part: Rectangle | None = None) -> Raster:
     if n > 1:
         height, width = values.shape
         out = np.full((-(-height // n), -(-width // n)), np.nan, np.float32)
-        _join(out, values, n)
+        given = np.ascontiguousarray(values).view()
+        given.setflags(write=False)  # of one type, for one compiled kernel
+        _join(out, given, n)
         values = out
     return Raster(
         values=values,

@@ -215,7 +215,7 @@ class Grid(CellMap):
         if extent is None:
             return None
         i0, j0, i1, j1 = extent
-        n = self.joined(extent)
+        n = self.coarseness(extent)
         values = np.full((-(-(j1 - j0) // n), -(-(i1 - i0) // n)), np.nan, np.float32)
         _probabilities(self.cells, self.log_odds, i0, j0, n, values)
         return self.raster(values, extent, n)

@@ -145,7 +145,7 @@ class CellMap(abc.ABC):
         (i0, j0), (i1, j1) = places.min(axis=0).tolist(), (places.max(axis=0) + 1).tolist()
         return i0 * SIDE, j0 * SIDE, i1 * SIDE, j1 * SIDE
 
-    def joined(self, extent: tuple[int, int, int, int]) -> int:
+    def coarseness(self, extent: tuple[int, int, int, int]) -> int:
         """How many cells a side are one in a raster of ``extent``, so that it has ``MAX_CELLS``."""
         i0, j0, i1, j1 = extent
         n = 1

@@ -26,7 +26,7 @@ def existence(network: Network) -> Raster | None:
     np.maximum(y, values, out=values)
     np.minimum(values, np.float32(1.0), out=values)
     values[values == 0.0] = np.nan
-    n = network.joined(extent)
+    n = network.coarseness(extent)
     return network.raster(found.spread(values, np.nan, n), extent, n)
 
 
@@ -37,7 +37,7 @@ def changes(network: Network) -> Changes | None:
     A constant input I holds x at I / (A + I), so A x / (1 - x) is the input that x speaks of.
     """
     extent = network.extent()
-    if extent is None or network.config.trace_s == 0.0 or network.joined(extent) > 1:
+    if extent is None or network.config.trace_s == 0.0 or network.coarseness(extent) > 1:
         return None
     found, x, y = _living(network, extent)
     lately = np.minimum(np.float32(network.config.decay_per_s) * x / (1.0 - x), np.float32(1.0))
