@@ -116,12 +116,19 @@ def ahead(reward: str, frame_skip: int = 1, speed: float = 1.0, steps: int = 200
     _, info = env.reset(seed=1, options=empty)
     x, y, theta = info["pose"]
     goal = (x + 1.2 * math.cos(theta), y + 1.2 * math.sin(theta))
-    env.reset(seed=1, options={"goal": goal, **empty})
-    rewards, terminated = [], False
+    _, info = env.reset(seed=1, options={"goal": goal, **empty})
+    start, rewards, terminated = info["goal_distance"], [], False
     while not terminated and len(rewards) < steps:
         _, reward_, terminated, _, info = env.step(np.array([speed, 0.0], np.float32))
         rewards.append(reward_)
-    return rewards, info, env.simulation.world.time_ns * 1e-9
+    return rewards, {**info, "start": start}, env.simulation.world.time_ns * 1e-9
+
+
+def test_progress_is_the_way_towards_the_goal_which_ends_the_episode():
+    rewards, info, _ = ahead("progress")
+    assert info["is_success"]
+    assert info["goal_distance"] < 0.4
+    assert sum(rewards) == pytest.approx(info["start"] - info["goal_distance"], abs=1e-9)
 
 
 def test_a_sparse_reward_is_one_at_the_goal_and_nothing_before():
