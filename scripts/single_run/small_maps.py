@@ -7,8 +7,8 @@ from dataclasses import dataclass
 
 from slam.estimate import Changes, Raster
 from slam.frontend.seen_space import SeenSpace
+from slam.rasters import joined, known
 from slam.replay import Track
-from slam.strips import MapStrips, joined_together
 
 MOST_PIXELS = 1 << 26  # of map.pgm: a square of 245 m at 3 cm, which a map_server holds as 67 MB
 MOST_CELLS = 800  # along the longer side; a picture of a map drops cells where it has more
@@ -16,15 +16,11 @@ MOST_CELLS = 800  # along the longer side; a picture of a map drops cells where 
 
 @dataclass(frozen=True, eq=False)
 class Drawn:
-    """A map and its changes as pictures show them.
+    """What is known of a map; that and its changes as pictures show them."""
 
-    n   so many cells a side are one
-    """
-
-    cells: MapStrips
+    cells: Raster
     map: Raster
     changes: Changes | None
-    n: int
 
 
 def drawn(track: Track, most: int = MOST_CELLS) -> Drawn | None:
@@ -33,33 +29,30 @@ def drawn(track: Track, most: int = MOST_CELLS) -> Drawn | None:
 
     Raises as ``Track.map`` does.
     """
-    cells = track.map_strips()
-    part = None if cells is None else cells.trimmed()
-    known = None if cells is None else cells.known()
-    if cells is None or part is None or known is None:
+    raster = track.map()
+    part = None if raster is None else known(raster)
+    if raster is None or part is None:
         return None
-    n = max(-(-max(part.shape) // most), 1)
-    changes, found = None, track.changes_strips()
-    if found is not None:
-        same = [layer.cut(known) if layer.shape == cells.shape else layer for layer in found]
-        appeared, gone = joined_together(same, n)
+    cells = joined(raster, 1, part)
+    n = max(-(-max(cells.values.shape) // most), 1)
+    changes = track.changes()
+    if changes is not None:
+        appeared, gone = (
+            joined(layer, n, part if layer.values.shape == raster.values.shape else None)
+            for layer in (changes.appeared, changes.gone)
+        )
         changes = Changes(appeared=appeared, gone=gone)
-    return Drawn(part, part.joined(n).whole(), changes, n)
+    return Drawn(cells, joined(cells, n), changes)
 
 
-def for_file(cells: MapStrips, seen: SeenSpace) -> tuple[MapStrips, str]:
+def for_file(cells: Raster, seen: SeenSpace) -> tuple[Raster, str]:
     """A map with the space that was seen, such that it fits into one image file, and what to say
     where its cells had to be joined."""
-    whole = fitting = seen.merge(cells)
-    n = 1
-    while fitting.shape[0] * fitting.shape[1] > MOST_PIXELS:
-        n += 1
-        fitting = seen.merge(cells.joined(n))
-    if n == 1:
-        return whole, ""
-    height, width = whole.shape
+    fitting = seen.merge(cells, MOST_PIXELS)
+    if fitting.resolution_m == cells.resolution_m:
+        return fitting, ""
+    height, width = (fitting.resolution_m * n for n in fitting.values.shape)
     return fitting, (
         f"map.pgm has cells of {fitting.resolution_m:g} m instead of {cells.resolution_m:g} m: "
-        f"the map is {width * cells.resolution_m:.0f} m x {height * cells.resolution_m:.0f} m, "
-        f"and the image has {MOST_PIXELS} cells at most."
+        f"the map is {width:.0f} m x {height:.0f} m, and the image has {MOST_PIXELS} cells at most."
     )
