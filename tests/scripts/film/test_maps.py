@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scripts.film.encode import LAPSE_FPS, MOST_PICTURES, Pace
-from scripts.single_run.small_maps import drawn, for_file
+from scripts.single_run.score import drawn, for_file
 from sim.view import moment
 from slam import create
 from slam.frontend.seen_space import SeenSpace
@@ -76,7 +76,7 @@ def test_a_map_in_pictures_keeps_thin_walls_and_its_extent():
 def test_a_map_too_large_for_an_image_has_coarser_cells_and_says_so(monkeypatch):
     strips = of_raster(made(1000, 500))
     assert for_file(strips, SeenSpace()) == (strips, "")
-    monkeypatch.setattr("scripts.single_run.small_maps.MOST_PIXELS", 125_000)
+    monkeypatch.setattr("scripts.single_run.score.MOST_PIXELS", 125_000)
     fitting, said = for_file(strips, SeenSpace())
     assert fitting.shape == (500, 250)
     assert "cells of 0.1 m instead of 0.05 m: the map is 25 m x 50 m" in said

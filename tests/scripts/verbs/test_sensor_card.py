@@ -11,10 +11,10 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.card import beside, real, stated
+from scripts.card import beside, stated
 from scripts.card import rows as sensor_rows
+from scripts.card.beside import simulated
 from scripts.card.page import Row, page
-from scripts.card.real import simulated
 from scripts.verbs.sensor_card import sensor_card
 from sim.sensors.lidar.registry import scanner_of
 from sim.sensors.lidar.sheet import NOT_STATED, sheet_of
@@ -146,7 +146,7 @@ def test_a_log_beside_simulated_scans(
 ) -> None:  # fmt: skip
     monkeypatch.setenv("COLUMNS", "200")
     asked = []
-    monkeypatch.setattr(real, "simulated_card", lambda name: asked.append(name) or cards["0.01"])
+    monkeypatch.setattr(beside, "simulated_card", lambda name: asked.append(name) or cards["0.01"])
     sensor_card(log=[flaser(tmp_path / "robot.log")], out=tmp_path / "out")
     assert asked == ["lms221(resolution_deg=1)"]
     page = (tmp_path / "out" / "real_scanner_log.md").read_text()
