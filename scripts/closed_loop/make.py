@@ -13,7 +13,8 @@ from rich.table import Table
 from scenes import registry
 from scripts.closed_loop import pictures, tables
 from scripts.closed_loop.folder import LEVELS, TABLE
-from scripts.closed_loop.plan import RUNS, SCHEMA, Driven, Plan, load
+from scripts.closed_loop.plan import RUNS, SCHEMA, Plan
+from scripts.closed_loop.runs import Driven, load
 from scripts.comparison.csv_files import write_checked, write_csv
 from scripts.console import level_table
 from scripts.jobs import run_jobs, try_names

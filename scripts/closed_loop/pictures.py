@@ -15,7 +15,7 @@ from matplotlib.lines import Line2D
 import scenes
 from scenes.scene import Scene
 from scripts import figures
-from scripts.closed_loop.plan import Driven
+from scripts.closed_loop.runs import Driven
 from scripts.figures import COLORS, color_of, save, styled
 from sim.view.draw import Picture
 from sim.view.mapview import MapView

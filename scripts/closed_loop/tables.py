@@ -9,7 +9,8 @@ from typing import Any
 
 import numpy as np
 
-from scripts.closed_loop.plan import IDENTITY, Driven
+from scripts.closed_loop.plan import IDENTITY
+from scripts.closed_loop.runs import Driven
 from scripts.comparison.tables import grouped
 from slam.evaluation.statistics import median_interval, quantile, share_interval
 

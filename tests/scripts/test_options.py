@@ -15,7 +15,7 @@ from typer.testing import CliRunner
 import sim
 from scripts.cli import app
 from scripts.closed_loop.plan import Plan as DrivePlan
-from scripts.closed_loop.plan import load
+from scripts.closed_loop.runs import load
 from scripts.comparison import schema
 from scripts.comparison.make import carry_out
 from scripts.comparison.plan import Plan

@@ -77,7 +77,7 @@ def test_submit_verify_and_merge(outside: Path):
     compared = read(outside / "out/benchmark/busy-chairs-v1")
     assert compared.axis == "level"
     run = again.run_of(compared.folder / "runs" / "apartment_l0.5_s720.npz")
-    assert run.recipe.moving_share == 0.5
+    assert run.settings["moving_share"] == 0.5
 
     wrong = json.loads(file.read_text().replace(data["sha256"], "0" * 64))
     file.write_text(json.dumps(wrong))

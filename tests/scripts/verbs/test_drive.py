@@ -10,7 +10,8 @@ import pytest
 
 from scripts.closed_loop import tables
 from scripts.closed_loop.make import carry_out
-from scripts.closed_loop.plan import Driven, Plan, load, run_one
+from scripts.closed_loop.plan import Plan
+from scripts.closed_loop.runs import Driven, load, run_one
 from scripts.verbs.drive import _goals, _seeds
 from sim.loop import LoopConfig
 from slam.errors import InvalidValueError, OutputError, UnknownNameError
