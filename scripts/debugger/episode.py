@@ -15,7 +15,7 @@ from scripts.names import file_name, is_run
 from scripts.options import admitted, whole
 from sim.recording.recipe import Made
 from sim.recording.sums import check_vouched
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import InvalidValueError, LogFormatError, MissingPathError
 from slam.frames import Float
 from slam.trajectory import read_tum
 
@@ -60,7 +60,7 @@ def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> 
     """The case of a folder of ``mobilia run`` or ``demo``, of an episode of a dataset, or of a run
     of a comparison. Raises as ``scripts.comparison.again.again``, which has ``trust``, too."""
     if not folder.exists():
-        raise LogFormatError(folder, "no such folder")
+        raise MissingPathError(folder, "no such folder")
     found, recorded = again(folder, trust), None
     if found.twin:
         raise LogFormatError(

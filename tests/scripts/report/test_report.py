@@ -379,8 +379,3 @@ def test_another_folder_is_told_which_verb_is_missing(tmp_path: Path, kind: str,
     with pytest.raises(LogFormatError, match=re.escape(says)) as told:
         CliRunner().invoke(cli.app, ["report", str(folder)], catch_exceptions=False)
     assert str(folder) in str(told.value)
-
-
-def test_what_is_not_there_is_told_the_verb_too(tmp_path: Path):
-    with pytest.raises(LogFormatError, match="no such folder: mobilia compare"):
-        CliRunner().invoke(cli.app, ["report", str(tmp_path / "no")], catch_exceptions=False)
