@@ -234,8 +234,8 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     )
     covariances, weights = np.empty((count, 3)), np.empty(count)
     left = _surveyed(
-        points, beams, spec.T_robot_laser, NEAR_CELLS * grain.cell_m, (spec.angle_increment, n, use),
-        max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2,
+        points, beams, spec.T_robot_laser, NEAR_CELLS * grain.cell_m,
+        (spec.angle_increment, n, use), max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2,
         onward, tangents, facings, covariances, weights,
     )  # fmt: skip
     view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m)

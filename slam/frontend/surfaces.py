@@ -101,7 +101,7 @@ def join(
 
 
 @inner
-def follow_ends(  # noqa: PLR0913 (kernel)
+def follow_ends(
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],

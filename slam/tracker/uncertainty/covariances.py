@@ -113,7 +113,7 @@ def root_share(
 
 
 @njit
-def advance(  # noqa: PLR0913 (kernel)
+def advance(  # noqa: C901, PLR0913 (kernel)
     drift: NDArray[np.float64],
     blind: NDArray[np.float64],
     shared: NDArray[np.float64],

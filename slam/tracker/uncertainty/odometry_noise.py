@@ -30,7 +30,8 @@ def _across(covariance: Float, across: tuple[float, float]) -> float:
     """Variance of the position along a unit vector; of both directions where that is zero."""
     (a, b, _), (_, d, _), _ = covariance.tolist()
     x, y = across
-    return a + d if x == y == 0.0 else x * x * a + 2.0 * x * y * b + y * y * d
+    variance: float = a + d if x == y == 0.0 else x * x * a + 2.0 * x * y * b + y * y * d
+    return variance
 
 
 class OdometryNoise:

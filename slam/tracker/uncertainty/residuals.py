@@ -25,7 +25,8 @@ from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MASK, SHIFT, Cells
 
-SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(
+# places in the sums of ``_look``
+SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
     8
 )  # places in the sums of ``_look``
 
@@ -148,7 +149,7 @@ def _free_standing(
 
 
 @njit
-def _look(  # noqa: PLR0913 (kernel)
+def _look(  # noqa: PLR0913, PLR0915 (kernel)
     cells: Cells, short_term: float, cell: float,
     points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
     joined: NDArray[np.bool_], laser: NDArray[np.float64], pose: NDArray[np.float64],
@@ -260,7 +261,8 @@ def look(
     _look(
         cell_map.cells, short_term, cell_map.cell,
         seen.points_robot, seen.covariances, weights, seen.joined, seen.T_robot_laser,
-        T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed), since_s), pairing, geometry, sums,
+        T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed), since_s), pairing,
+        geometry, sums,
     )  # fmt: skip
     shared, paired, feigned, new, weighed = sums[:NEW_XX].tolist()
     return Evidence(

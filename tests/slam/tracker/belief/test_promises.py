@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from slam.frontend.observations import observe
-from slam.grid import OccupancySlam
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.episode import Episode
 from slam.tracker.belief.posterior import Odds

@@ -36,7 +36,7 @@ def join(
 
 
 @njit
-def follow_ends(  # noqa: PLR0913 (kernel)
+def follow_ends(
     points: Array, beams: Array, origin: Array, joined: Array, sweep: tuple[float, int, float],
     tangents: Array,
 ) -> None:  # fmt: skip
