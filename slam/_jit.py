@@ -27,9 +27,11 @@ import numba
 from numba.core import event
 
 from slam import _numba  # noqa: F401  (before anything else imports Numba)
+from slam._linking import link_once
 
 _log = logging.getLogger(__name__)
 _cache_is_writable = True
+link_once()
 _OPTIONS = {"nogil": True, "no_cfunc_wrapper": True}
 
 P = ParamSpec("P")
