@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from sim.core.engine import Engine, call, engine
+from sim.core.packed import packed
 from sim.world import substeps
 from sim.world.world import World
 from slam._jit import njit
@@ -48,12 +49,12 @@ def test_many_substeps_at_once_are_single_ones():
     """Also where the robot runs into something."""
     worlds = [World("arena", seed=100, dynamism=0.9) for _ in range(2)]
     watch = substeps.unseen(9)
-    _, _, path, travel = watch
+    path, travel = watch.path, watch.travel
     touched: list[list[str]] = [[], []]
     for world in worlds:
         world.set_command(1.0, 0.0)
     for _ in range(180):
-        worlds[0].advance(0, 8, watch)
+        worlds[0].advance(0, 8, packed(watch))
         for k in range(8):
             worlds[1].substep()
             np.testing.assert_array_equal(path[k + 1], worlds[1].robot_pose())
