@@ -23,10 +23,13 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 
+# isort: off
+from slam import _numba  # noqa: F401  (before anything else imports Numba)
+
+# isort: on
 import numba
 from numba.core import event
 
-from slam import _numba  # noqa: F401  (before anything else imports Numba)
 from slam._linking import link_once
 
 _log = logging.getLogger(__name__)

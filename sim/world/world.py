@@ -163,7 +163,7 @@ class World:
         physics = substeps.Physics(data.qpos, data.qvel, data.ctrl, data.qfrc_applied, mocap)
         shoved, rolled = tables(self.model, self._shoves)
         actors = substeps.Actors(
-            self.people.table, self._doors.leaves, shoved, rolled, self._pinned
+            self.people.for_kernels(), self._doors.leaves, shoved, rolled, self._pinned
         )
         room = substeps.Room(self._clock, engine(self.model, data), robot, physics, actors)
         return packed(room)

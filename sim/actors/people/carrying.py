@@ -157,9 +157,11 @@ def pushes(
 
 @inner
 def keep_hold(
-    i: int, velocity: tuple[float, float], crowd: Crowd, held: Held, at: Int
+    i: int, velocity: tuple[float, float], crowd: Crowd, held: Held | None, at: Int
 ) -> tuple[float, float]:
     """The velocity of person ``i`` less what would tear it from the thing it holds."""
+    if held is None:
+        return velocity
     vx, vy = velocity
     row = crowd.task[i].held
     for k in range(len(held.at) if row >= 0 else 0):
@@ -285,13 +287,13 @@ def find_work(i: int, time: float, field: Field, leaders: Leaders, crowd: Crowd)
 
 
 @inner
-def clean(  # noqa: PLR0913 (kernel)
+def clean(  # noqa: C901, PLR0913 (kernel)
     i: int,
     time: float,
     field: Field,
-    leaders: Leaders,
+    leaders: Leaders | None,
     crowd: Crowd,
-    held: Held,
+    held: Held | None,
     at: Int,
     weights: Float,
 ) -> None:
@@ -299,6 +301,8 @@ def clean(  # noqa: PLR0913 (kernel)
 
     A chair that cannot be reached is left; one that cannot be brought to its place is put down.
     """
+    if leaders is None or held is None:
+        return
     task, state, hand = crowd.task, crowd.state, crowd.task[i].hand
     if hand < 0 or task[i].first < 0:
         return

@@ -6,6 +6,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -84,7 +85,7 @@ class People:
         pace: float,
         counters: NDArray[np.uint64],
     ) -> None:
-        scene = bodies.scene
+        self._scene = scene = bodies.scene
         self.names = [m.name for m in scene.movers if m.group == "person"]
         n = len(self.names)
         self._rates = (stay_mean, pace)
@@ -146,6 +147,12 @@ class People:
                 if not hold.hinged:
                     state["turn_rate"][i] = ACTORS.holding.turn_most
         return leaders_of([planar.index(name) for name in leaders], lines.rows)
+
+    def for_kernels(self) -> crowd.People:
+        """``table``; without leaders and hands where nobody has a role, which spares compiling."""
+        nobody: Any = None
+        roles = bool(self._scene.roles or self._scene.holds)
+        return self.table if roles else self.table._replace(leaders=nobody, held=nobody)
 
     def start(self, data: mujoco.MjData, *, waiting: int = 0) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand.
