@@ -164,33 +164,31 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
 
 
 @inner
-def wish(
-    i: int, time: float, tick: float, people: People, leaders: Leaders | None
-) -> tuple[float, float]:
-    """The velocity of person ``i``, who has a role, as ``want``; keeps account of the way."""
-    if leaders is None:
-        return 0.0, 0.0
+def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float]:
+    """The velocity person ``i`` would like to have, whatever it does; keeps account of the way."""
     crowd, field = people.crowd, people.field
     state, task = crowd.state, crowd.task
     doing = task[i].walking
+    if doing < columns.FOLLOWS:
+        return want(i, people.rates[1], people.ways, field, crowd)
     if doing == columns.FOLLOWS:
-        state[i].look = faces(i, leaders, crowd)
-        if rests(i, time, leaders, crowd):
+        state[i].look = faces(i, people.leaders, crowd)
+        if rests(i, time, people.leaders, crowd):
             return make_room(i, (0.0, 0.0), field, crowd)
-        wx, wy = follow(i, field, leaders, crowd)
+        wx, wy = follow(i, field, people.leaders, crowd)
         wx, wy = round_leaf(i, (wx, wy), people.ways, crowd.discs)
         wx, wy = at_doors(i, (wx, wy), people.ways, field, crowd.discs)
-        wx, wy = wait_behind(i, (wx, wy), field, leaders, crowd)
+        wx, wy = wait_behind(i, (wx, wy), field, people.leaders, crowd)
         wx, wy = make_room(i, (wx, wy), field, crowd)
-        wx, wy = make_way(i, (wx, wy), field, leaders, crowd)
+        wx, wy = make_way(i, (wx, wy), field, people.leaders, crowd)
     elif doing == columns.QUEUES:
-        wx, wy = stand_in_line(i, time, leaders, crowd)
+        wx, wy = stand_in_line(i, time, people.leaders, crowd)
     else:
-        wx, wy = to_what_is_taken(i, field, leaders, crowd)
+        wx, wy = to_what_is_taken(i, field, people.leaders, crowd, people.held)
     if wx * wx + wy * wy > 0.09:
         still = crowd.discs[i].u ** 2 + crowd.discs[i].v ** 2 < STILL * STILL
         # Who stands still with the leader has nowhere to get on to.
-        waits = still and doing == columns.FOLLOWS and near_place(i, leaders, crowd)
+        waits = still and doing == columns.FOLLOWS and near_place(i, people.leaders, crowd)
         state[i].walked_s += 0.0 if waits else tick
         if still:
             state[i].blocked += tick
@@ -226,14 +224,11 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
             vx, vy = to_chair(i, crowd)
             steer(i, tick, vx, vy, crowd, ctrl[servos[i] : servos[i] + 3])
             continue
-        if crowd.task[i].walking < columns.FOLLOWS:
-            wanted = want(i, people.rates[1], ways, field, crowd)
-        else:
-            wanted = wish(i, time, tick, people, people.leaders)
+        wanted = wish(i, time, tick, people)
         count = nearby(i, crowd, ways.sides, near)
         fade = patience(i, time, crowd)
         if is_pushing(i, crowd):
-            vx, vy = pushes(i, wanted, near[:count], field, crowd)
+            vx, vy = pushes(i, wanted, near[:count], field, crowd, people.held)
         else:
             vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
         before = vx * vx + vy * vy

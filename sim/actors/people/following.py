@@ -108,10 +108,8 @@ def _crossing(a: float, b: float, p: float, q: float) -> float:
 
 
 @inner
-def spread_out(field: Field, leaders: Leaders | None, crowd: Crowd) -> None:
+def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
     """Where everybody's place is now; pairs who would cross take each other's."""
-    if leaders is None:
-        return
     state, task, discs = crowd.state, crowd.task, crowd.discs
     for i in range(len(task)):
         if task[i].walking == columns.FOLLOWS:

@@ -57,10 +57,8 @@ def arrays(leaders: Leaders) -> dict[str, NDArray[np.generic]]:
 
 
 @inner
-def note_ways(tick: float, leaders: Leaders | None, crowd: Crowd) -> None:
+def note_ways(tick: float, leaders: Leaders, crowd: Crowd) -> None:
     """Remember where every leader is, and turn its formation after it."""
-    if leaders is None:
-        return
     for k in range(len(leaders.rows)):
         disc, course = crowd.discs[leaders.rows[k]], leaders.course[k]
         x, y, u, v = disc.x, disc.y, disc.u, disc.v

@@ -85,7 +85,7 @@ class People:
         pace: float,
         counters: NDArray[np.uint64],
     ) -> None:
-        self._scene = scene = bodies.scene
+        scene = bodies.scene
         self.names = [m.name for m in scene.movers if m.group == "person"]
         n = len(self.names)
         self._rates = (stay_mean, pace)
@@ -149,10 +149,9 @@ class People:
         return leaders_of([planar.index(name) for name in leaders], lines.rows)
 
     def for_kernels(self) -> crowd.People:
-        """``table``; without leaders and hands where nobody has a role, which spares compiling."""
-        nobody: Any = None
-        roles = bool(self._scene.roles or self._scene.holds)
-        return self.table if roles else self.table._replace(leaders=nobody, held=nobody)
+        """``table``; without hands where nobody takes hold of anything, which spares compiling."""
+        none: Any = None
+        return self.table if len(self.table.held.at) else self.table._replace(held=none)
 
     def start(self, data: mujoco.MjData, *, waiting: int = 0) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand.

@@ -63,3 +63,15 @@ def test_many_substeps_at_once_are_single_ones():
             names += [str(contact) for contact in world.take_contacts()]
     assert touched[0] == touched[1] != []
     assert worlds[0].save_state() == worlds[1].save_state()
+
+
+def test_rooms_are_of_two_types_with_and_without_hands():
+    """Each type is compiled for itself, for seconds: what else stands in a room must make none."""
+    free = [
+        World("arena", seed=1, crowd="none"),
+        World("office", seed=2, dynamism=0.9, n_chairs=3, crowd="escorts:2,queue:2"),
+    ]
+    held = [World("arena", seed=1, crowd=crowd) for crowd in ("boards:1", "cleaners:1")]
+    types = [{world._room._numba_type_ for world in worlds} for worlds in (free, held)]
+    assert [len(each) for each in types] == [1, 1]
+    assert types[0] != types[1]
