@@ -339,7 +339,7 @@ _LOST = (
     "The level from which half of the runs are lost, with its 95 % interval (bootstrap over the "
     "seeds, isotonic regression); levels go from 0 to 1. It is `never` where the whole interval is "
     f"above 1, and has no interval with fewer than {LEAST_RUNS} seeds. A track "
-    "counts where an oracle is never lost, and at most 2 cm off."
+    "counts where an oracle is lost in at most a tenth of its runs, and at most 5 cm off."
 )
 
 

@@ -20,6 +20,7 @@ from typing import Any
 
 from scripts.benchmark.submission import RUN, SHA256
 from scripts.benchmark.tracks import (
+    FRESH,
     LEVELS,
     QUICK_LEVELS,
     TRACKS,
@@ -199,10 +200,12 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--levels", type=float, nargs="+", default=list(LEVELS))
     parser.add_argument("--first", type=int, default=0, help="of the test seeds")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--fresh", action="store_true", help=f"seeds from {FRESH[0]} on, instead")
     wanted = parser.parse_args(arguments)
     if wanted.run:
         for track in chosen(wanted.tracks):
-            seeds = track.test[wanted.first : wanted.first + wanted.seeds]
+            of = FRESH if wanted.fresh else track.test
+            seeds = of[wanted.first : wanted.first + wanted.seeds]
             plan = track.plan(wanted.run, seeds, levels=tuple(wanted.levels))
             note(f"{track.name}: {track.about}")
             compare(plan, wanted.folders[0] / track.name)

@@ -27,6 +27,8 @@ from slam.tracker.cells import MASK, SHIFT, Cells
 
 # places in the sums of ``_look``
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
+
+
 class Pairing(NamedTuple):
     """How points are paired and compared; lengths in m, the others as in ``ResidualConfig``."""
 
