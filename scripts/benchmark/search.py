@@ -27,8 +27,9 @@ from scripts.benchmark.scores import FAIR_M, TRACKING, Row
 from scripts.benchmark.tracks import DEPTH_CAMERA, GOOD_ODOMETRY, LEVELS, TRAIN, Track
 from scripts.comparison.entry import Entry
 from scripts.comparison.recording import load, record
+from scripts.console import ended
 from sim.core.versions import WORLD
-from slam.errors import InvalidValueError, MobiliaError
+from slam.errors import InvalidValueError
 from slam.evaluation.statistics import quantile
 from slam.frames import BeamClass
 from slam.guests import Limits
@@ -143,7 +144,8 @@ def search(spaces: Sequence[str], tries: range, seeds: Sequence[int], slam: str,
         print(state, space, k, told, about, flush=True)
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@ended
+def main(arguments: Sequence[str] | None = None) -> None:
     """Search."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("spaces", nargs="+", choices=sorted(SPACES))
@@ -155,12 +157,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     wanted.out.parent.mkdir(parents=True, exist_ok=True)
     tries = range(wanted.first, wanted.first + wanted.tries)
-    try:
-        search(wanted.spaces, tries, TRAIN[: wanted.seeds], wanted.slam, wanted.out)
-    except (MobiliaError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
+    search(wanted.spaces, tries, TRAIN[: wanted.seeds], wanted.slam, wanted.out)
 
 
 if __name__ == "__main__":

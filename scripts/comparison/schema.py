@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from scripts.comparison.arrays import Array
 from scripts.comparison.rules import (
     LEVEL,
     MAX_MESSAGE,
     PLAIN,
     SHARE,
     TRUTH,
+    Array,
     Columns,
     Rule,
     Table,

@@ -24,7 +24,7 @@ from PIL import Image
 
 import scenes
 from scripts.benchmark.tracks import newest
-from scripts.experiments.measured import ended
+from scripts.console import ended
 from scripts.film.encode import film
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation
@@ -219,6 +219,7 @@ def with_clips(text: str, clips: Path) -> str:
     return _PICTURE.sub(linked, text)
 
 
+@ended
 def main(arguments: list[str] | None = None) -> int:
     """Make those asked for, all by default; 1 where there is no OpenGL."""
     known = [*clips(), CROWDS]
@@ -242,4 +243,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(ended(main))
+    sys.exit(main())

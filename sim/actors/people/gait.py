@@ -194,5 +194,7 @@ def walk(  # noqa: PLR0913 (kernel)
             pose_leg((x, y, height), pose[2], place, pos, quat)
             for link in range(2):
                 row = limbs[i, 2 * foot + link]
-                mocap[0][row] = pos[link]
-                mocap[1][row] = quat[link]
+                for k in range(3):
+                    mocap[0][row, k] = pos[link, k]
+                for k in range(4):
+                    mocap[1][row, k] = quat[link, k]
