@@ -30,7 +30,7 @@ from sim.core.engine import Engine, call
 from sim.core.flow import Field
 from sim.core.state import Records
 from sim.sensors.lidar.windows import Noted, note
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 
 Float = NDArray[np.float64]
 SUBSTEPS_PER_S = 300
@@ -140,10 +140,10 @@ def _actors(parts: Any) -> Actors:
     """Inverse of ``plain``."""
     folk, doors, shoved, rolled, pinned = parts
     alive, rates, at, field, ways, crowd, servos, torsos, limbs, feet, sitting = folk[:11]
-    hulls, leaders, held, weights = folk[11:]
+    hulls, leaders, held, weights, scratch = folk[11:]
     people = People(
         alive, rates, Addresses(*at), Field(*field), Doors(*ways), Crowd(*crowd), servos, torsos,
-        limbs, feet, sitting, Hulls(*hulls), Leaders(*leaders), Held(*held), weights,
+        limbs, feet, sitting, Hulls(*hulls), Leaders(*leaders), Held(*held), weights, scratch,
     )  # fmt: skip
     return Actors(
         people,
@@ -154,7 +154,7 @@ def _actors(parts: Any) -> Actors:
     )
 
 
-@njit
+@uncounted
 def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:  # noqa: C901 (kernel)
     """Make the substeps that end at rows ``first + 1`` to ``last`` of ``watch``.
 
