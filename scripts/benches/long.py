@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether time and memory stay flat for hours: ``python -m scripts.benches.long [LOG] [--hours 2]``.
+"""Whether time and memory stay flat for hours: ``python -m scripts.benches.long [LOG]``.
 
 Without a log, the robot tours the station at motion 1. A log is driven there and back again, so
 that a minute of it becomes hours of one building.
