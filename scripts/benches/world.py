@@ -174,7 +174,7 @@ def environments(seconds: float) -> Iterator[Row]:
 def learning(seconds: float) -> Iterator[Row]:
     """Steps as who learns sees them: goal rooms of four scans a step, resets among them."""
     steps = max(20, round(10 * seconds / REPEATS))
-    for n, scans, target in ((1, "all", ""), (8, "all", ""), (8, "last", "≥ 400")):
+    for n, scans, target in ((1, "all", ""), (4, "last", ""), (16, "last", "≥ 400")):
         rooms = goal_rooms("mobilia/ArenaGoal-v2", n, n_threads=1, scans=scans, **GOAL_ROOM)
         rooms.reset(seed=SEED)
         figure = n * steps / stepping(_Resetting(rooms), steps, n)
