@@ -12,11 +12,9 @@ from __future__ import annotations
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-
 from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 
 BUCKETS = 64
 
@@ -71,7 +69,7 @@ def _keep(place: Float, position: Float, quaternion: Float) -> None:
         place[3 + i] = quaternion[i]
 
 
-@njit
+@uncounted
 def note(noted: Any) -> None:  # noqa: C901 (kernel)
     """Take over where geoms and laser are now, into the next slot of a packed ``Noted``."""
     runs, places, poses, lasers = noted.runs, noted.places, noted.poses, noted.lasers
@@ -122,7 +120,7 @@ def _horizontal_bound(table: Float, j: int, poses: Float, slot: int) -> float:
     return math.sqrt(s0 * s0 + s1 * s1 + s2 * s2)
 
 
-@njit
+@uncounted
 def enclose(table: Float, runs: Int, poses: Float, slots: int, bounds: Float) -> None:
     """Renew the bounds of what does not rest as before from its poses in the first ``slots``."""
     for k in range(runs.shape[0]):
@@ -281,8 +279,9 @@ def find_windows(  # noqa: PLR0913 (kernel)
 @inner
 def nearest_first(windows: Float, found: int, order: Int) -> None:
     """Order of the first ``found`` windows by distance, to 0.25 m: enough, and three times faster
-    than a sort."""
-    starts = np.zeros(BUCKETS + 1, dtype=np.int64)
+    than a sort. Its end is for counting."""
+    starts = order[len(order) - BUCKETS - 1 :]
+    starts[:] = 0
     for row in range(found):
         starts[1 + min(int(4.0 * windows[row, col.NEAR]), BUCKETS - 1)] += 1
     for k in range(BUCKETS):
