@@ -17,7 +17,7 @@ from pathlib import Path
 import numpy as np
 
 from scripts.benches.world import SEED
-from scripts.comparison.memory import reading_kb
+from scripts.comparison.entry import reading_kb
 from sim.simulation import Simulation, tour
 from slam import se2
 from slam.evaluation.lost import LOST_M
