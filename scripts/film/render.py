@@ -39,7 +39,7 @@ def shoot(stream: Stream, show: Show, reel: Film | None) -> Iterator[Frame]:
 def watched(frames: Iterator[Frame], stream: Stream, title: str) -> Iterator[Frame]:
     """``frames`` behind a progress bar."""
     with progress() as bar:
-        warming = "compiling inner loops (the first run only)"
+        warming = "compiling inner loops (the first run only, about half a minute)"
         task = bar.add_task(warming, total=stream.length, unit="")
         for count, frame in enumerate(frames, 1):
             interrupt.check()

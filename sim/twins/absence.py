@@ -142,7 +142,9 @@ def _park(world: World, name: str) -> None:
         i, table = world.people.names.index(name), world.people.table
         gait.stand(qpos, table.torsos[i : i + 1], world.people.feet[i : i + 1])
         physics, mocap = (qpos, world.data.qvel), (world.data.mocap_pos, world.data.mocap_quat)
-        gait.walk(0.0, physics, table.torsos, table.limbs, world.people.feet, table.sitting, mocap)
+        gait.walk(
+            0.0, physics, table.torsos, table.limbs, world.people.feet, table.crowd.state, mocap
+        )
 
 
 def _let_go(world: World, out: Sequence[str]) -> None:

@@ -172,7 +172,7 @@ def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
             if people.alive:
                 walk(
                     step, (physics.qpos, physics.qvel), people.torsos, people.limbs, people.feet,
-                    people.sitting, physics.mocap,
+                    people.crowd.state, physics.mocap,
                 )  # fmt: skip
             if clock[0] % SUBSTEPS_PER_TICK == 0:
                 control(clock[0] / SUBSTEPS_PER_S, robot, physics, actors)

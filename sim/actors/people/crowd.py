@@ -65,7 +65,7 @@ class People(NamedTuple):
     servos   (n,) first of the actuators vx, vy, vyaw of each
     torsos   (n, 2) first qpos and dof of each
     limbs    (n, 4) mocap rows of thigh_l, shank_l, thigh_r, shank_r
-    feet     (n, 8) of ``sim.actors.people.gait``; sitting (n,) 0 stands to 1 sits
+    feet     (n, 8) of ``sim.actors.people.gait``
     hulls    what of the model follows who sits
     leaders  who is followed; held  who holds what
     weights  (k, 2) mass kg and yaw inertia kg m2 of each planar disc row
@@ -82,7 +82,6 @@ class People(NamedTuple):
     torsos: Int
     limbs: Int
     feet: Float
-    sitting: Float
     hulls: Hulls
     leaders: Leaders
     held: Held

@@ -14,6 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.core.state import Records
 from slam._jit import inner, njit, uncounted
 
 Float = NDArray[np.float64]
@@ -167,7 +168,7 @@ def walk(  # noqa: PLR0913 (kernel)
     addresses: Int,
     limbs: Int,
     feet: Float,
-    sitting: Float,
+    state: Records,
     mocap: tuple[Float, Float],
 ) -> None:
     """Advance all feet by ``dt`` s and pose all limbs.
@@ -176,14 +177,14 @@ def walk(  # noqa: PLR0913 (kernel)
     addresses  (n, 2) first qpos and dof of each torso
     limbs      (n, 4) mocap rows of thigh_l, shank_l, thigh_r, shank_r
     feet       (n, 8) state
-    sitting    (n,) 0 stands to 1 sits: the hips sink, the feet go forward
+    state      (n,) of ``columns``, whose ``sit`` is 0 stands to 1 sits: hips sink, feet go forward
     mocap      positions and quaternions, written
     """
     qpos, qvel = physics
     for i in range(feet.shape[0]):
         q, v = addresses[i]
         pose = (qpos[q], qpos[q + 1], qpos[q + 2])
-        p, sit = feet[i], sitting[i]
+        p, sit = feet[i], state[i].sit
         forward, height = KNEES * sit, HIP - (HIP - SEAT_HEIGHT) * sit
         if dt > 0.0:
             over = (

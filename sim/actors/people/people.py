@@ -106,7 +106,6 @@ class People:
             torsos=np.ascontiguousarray(at.discs[:n]),
             limbs=np.array(limbs, dtype=np.int64).reshape(n, 4),
             feet=self.feet,
-            sitting=self.crowd.state["sit"],
             hulls=_hulls(model, self.names),
             leaders=self._give_roles(_planar(bodies, self.names), scene),
             held=holding.hands(model, bodies, scene, self._cleaners),
@@ -181,7 +180,7 @@ class People:
         self.crowd.state["stay_until"][i] = time_s
         gait.stand(data.qpos, t.torsos[i : i + 1], self.feet[i : i + 1])
         physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
-        gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.sitting, mocap)
+        gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.crowd.state, mocap)
 
     def dress(self) -> None:
         """Let the model follow who sits: hulls that meet no chair, torsos lowered."""
@@ -193,7 +192,7 @@ class People:
             t = self.table
             gait.stand(data.qpos, t.torsos, self.feet)
             physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
-            gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.sitting, mocap)
+            gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.crowd.state, mocap)
 
     def in_use(self, bodies: Bodies) -> NDArray[np.int64]:
         """Rows of the movers that somebody sits on or holds, or goes to for that."""

@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.actors.people import gait
+from sim.actors.people import columns, gait
 
 DT = 1.0 / 300.0
 
@@ -18,7 +18,7 @@ class Walker:
 
     def __init__(self, yaw: float) -> None:
         self.qpos, self.qvel = np.array([1.0, -2.0, yaw]), np.zeros(3)
-        self.feet, self.sitting = np.zeros((1, gait.N_COLUMNS)), np.zeros(1)
+        self.feet, self.state = np.zeros((1, gait.N_COLUMNS)), np.zeros(1, columns.STATE)
         self.at, self.limbs = np.zeros((1, 2), dtype=np.int64), np.arange(4).reshape(1, 4)
         self.pos, self.quat = np.zeros((4, 3)), np.zeros((4, 4))
         gait.stand(self.qpos, self.at, self.feet)
@@ -28,7 +28,7 @@ class Walker:
         self.qvel[:] = speed * math.cos(yaw), speed * math.sin(yaw), turn
         self.qpos += DT * self.qvel
         physics, mocap = (self.qpos, self.qvel), (self.pos, self.quat)
-        gait.walk(DT, physics, self.at, self.limbs, self.feet, self.sitting, mocap)
+        gait.walk(DT, physics, self.at, self.limbs, self.feet, self.state, mocap)
 
     def ends(self, length: float, rows: tuple[int, int]) -> np.ndarray:
         """Lower ends of the thighs (rows 0, 2) or shanks (rows 1, 3)."""
@@ -98,7 +98,7 @@ def test_who_stops_ends_with_the_feet_under_the_hips():
 def test_who_sits_has_hips_on_the_seat_and_feet_on_the_floor_in_front():
     walker = Walker(0.4)
     for k in range(900):
-        walker.sitting[0] = min(k / 240, 1.0)
+        walker.state["sit"][0] = min(k / 240, 1.0)
         walker.step(0.0)
     hips = walker.pos[[0, 2], 2]
     np.testing.assert_allclose(hips, gait.SEAT_HEIGHT, atol=1e-9)
