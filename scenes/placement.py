@@ -38,7 +38,7 @@ class Floor:
     def __init__(self, rects: Sequence[Rect], boxes: Float) -> None:
         self.rects = tuple(rects)
         self._areas = np.cumsum([(r[2] - r[0]) * (r[3] - r[1]) for r in self.rects])
-        self._boxes = boxes
+        self._boxes = np.array(boxes, order="C")  # of one type for the kernel, writable
         self._discs = np.empty((0, 3))
 
     def block(self, x: float, y: float, radius: float) -> None:

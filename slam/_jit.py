@@ -23,13 +23,18 @@ from pathlib import Path
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 
+# isort: off
+from slam import _numba  # noqa: F401  (before anything else imports Numba)
+
+# isort: on
 import numba
 from numba.core import event
 
-from slam import _numba  # noqa: F401  (before anything else imports Numba)
+from slam._linking import link_once
 
 _log = logging.getLogger(__name__)
 _cache_is_writable = True
+link_once()
 _OPTIONS = {"nogil": True, "no_cfunc_wrapper": True}
 
 P = ParamSpec("P")

@@ -16,6 +16,7 @@ import mujoco
 import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
+from sim.core.packed import packed
 from sim.gym.wrappers import goal_rooms
 from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.lidar.models.lms221 import Lms221Config
@@ -131,7 +132,7 @@ def physics(seconds: float) -> Iterator[Row]:
     for name, options, target in cases:
         world = World("office", seed=SEED, dynamism=DYNAMISM, **options)
         scans = max(40, round(seconds / REPEATS * SUBSTEPS_PER_S / 8))
-        watch = unseen(9)
+        watch = packed(unseen(9))
 
         def run(world: World = world, scans: int = scans, watch: Any = watch) -> None:
             for _ in range(scans):

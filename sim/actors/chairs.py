@@ -60,7 +60,8 @@ class Shoved(NamedTuple):
 @uncounted
 def shove(time: float, tick: float, shoved: Shoved, qfrc: Float) -> None:
     """Start and end shoves due at ``time`` s by writing generalised forces into ``qfrc``."""
-    rates, counters, schedule, bodies, dofs = shoved
+    rates, counters, schedule = shoved.rates, shoved.counters, shoved.schedule
+    bodies, dofs = shoved.bodies, shoved.dofs
     for i in range(len(dofs)):
         dof = dofs[i]
         if time >= schedule[i, 1]:

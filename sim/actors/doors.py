@@ -127,7 +127,9 @@ def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float
     robot    (3,) pose
     physics  qpos and qvel (read), qfrc_applied (written)
     """
-    rates, addresses, middles, closers, limits, passage, schedule, draws = leaves
+    rates, addresses, middles = leaves.rates, leaves.addresses, leaves.middles
+    closers, limits, passage = leaves.closers, leaves.limits, leaves.passage
+    schedule, draws = leaves.schedule, leaves.draws
     qpos, qvel, qfrc = physics
     for d in range(len(addresses)):
         at, dof = addresses[d]

@@ -47,8 +47,10 @@ class Held(NamedTuple):
 
 
 @inner
-def hold(held: Held, qpos: Float, qvel: Float, qfrc: Float) -> None:
+def hold(held: Held | None, qpos: Float, qvel: Float, qfrc: Float) -> None:
     """Write the forces of all hands into ``qfrc``."""
+    if held is None:
+        return
     for k in range(len(held.at)):
         hand = held.at[k]
         for axis in range(3 if hand.dropped >= 0 else 0):

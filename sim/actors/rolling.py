@@ -56,7 +56,8 @@ class Rolled(NamedTuple):
 @inner
 def roll(time: float, tick: float, rolled: Rolled, qvel: Float, qfrc: Float) -> None:
     """Write the generalised forces on all chairs at ``time`` s into ``qfrc``."""
-    share, ranks, counters, state, bodies, dofs = rolled
+    share, ranks, counters = rolled.share, rolled.ranks, rolled.counters
+    state, bodies, dofs = rolled.state, rolled.bodies, rolled.dofs
     n = len(dofs)
     if share == 0:
         return

@@ -81,7 +81,7 @@ class NavGrid:
 
 
 def _boxes(boxes: Float) -> Float:
-    return np.ascontiguousarray(boxes, dtype=np.float64).reshape(-1, 5)
+    return np.array(boxes, dtype=np.float64, order="C").reshape(-1, 5)  # of one type, writable
 
 
 @njit

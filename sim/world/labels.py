@@ -66,6 +66,7 @@ def _label(
         if moved[mover] < 0.0:
             dx, dy = poses[mover, 0] - last_seen[mover, 0], poses[mover, 1] - last_seen[mover, 1]
             moved[mover] = 0.0 if math.isnan(dx) else math.sqrt(dx * dx + dy * dy)
-            last_seen[mover] = poses[mover]
+            for i in range(3):
+                last_seen[mover, i] = poses[mover, i]
         kind[k] = MOVING if moving[mover] else SEMI_STATIC
         displacement[k] = moved[mover]

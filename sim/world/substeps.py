@@ -16,18 +16,15 @@ from numpy.typing import NDArray
 
 from sim.actors.chairs import Shoved, shove
 from sim.actors.doors import Leaves, swing
-from sim.actors.holding import Held, hold
+from sim.actors.holding import hold
 from sim.actors.people.crowd import People, decide
 from sim.actors.people.gait import walk
-from sim.actors.people.leaders import Leaders
-from sim.actors.people.right_of_way import Addresses, Crowd, Doors
-from sim.actors.people.trips import Hulls, dress
+from sim.actors.people.trips import dress
 from sim.actors.robot import ramp, roll
 from sim.actors.rolling import Rolled
 from sim.actors.rolling import roll as roll_chairs
 from sim.core.contacts import Touches, collect
 from sim.core.engine import Engine, call
-from sim.core.flow import Field
 from sim.core.state import Records
 from sim.sensors.lidar.windows import Noted, note
 from slam._jit import inner, uncounted
@@ -87,16 +84,26 @@ class Actors(NamedTuple):
     pinned: Pinned
 
 
+class Room(NamedTuple):
+    """All that a substep reads and writes; clock (1,) substeps made since the start."""
+
+    clock: NDArray[np.int64]
+    engine: Engine
+    robot: Robot
+    physics: Physics
+    actors: Actors
+
+
 class Watch(NamedTuple):
     """What is written down after each substep k: row k of all, longer than a scan where need be.
 
     marks    (n,) whether the scanner notes all poses
-    scanner  where to, a plain ``sim.sensors.lidar.windows.Noted``
+    scanner  where to, a ``sim.sensors.lidar.windows.Noted``
     path     (n, 3) pose of the robot; travel (n, 3) m rolled by the wheels, and to the left
     """
 
     marks: NDArray[np.bool_]
-    scanner: tuple[Any, ...]
+    scanner: Noted
     path: Float
     travel: Float
 
@@ -130,30 +137,6 @@ def pin(physics: Physics, pinned: Pinned) -> None:
         physics.ctrl[servo] = 0.0
 
 
-def plain(table: Any) -> Any:
-    """The same tables in plain tuples, which Numba takes over from Python three times faster."""
-    return tuple(map(plain, table)) if isinstance(table, tuple) else table
-
-
-@inner
-def _actors(parts: Any) -> Actors:
-    """Inverse of ``plain``."""
-    folk, doors, shoved, rolled, pinned = parts
-    alive, rates, at, field, ways, crowd, servos, torsos, limbs, feet, sitting = folk[:11]
-    hulls, leaders, held, weights, scratch = folk[11:]
-    people = People(
-        alive, rates, Addresses(*at), Field(*field), Doors(*ways), Crowd(*crowd), servos, torsos,
-        limbs, feet, sitting, Hulls(*hulls), Leaders(*leaders), Held(*held), weights, scratch,
-    )  # fmt: skip
-    return Actors(
-        people,
-        Leaves(*doors),
-        (Shoved(*shoved[0]), Shoved(*shoved[1]), Shoved(*shoved[2])),
-        (Rolled(*rolled[0]), Rolled(*rolled[1]), Rolled(*rolled[2])),
-        Pinned(*pinned),
-    )
-
-
 @uncounted
 def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:  # noqa: C901 (kernel)
     """Make the substeps that end at rows ``first + 1`` to ``last`` of ``watch``.
@@ -161,16 +144,14 @@ def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:
     Returns the last row. At the robot's first touch it returns early, with the row before, as it
     does not know yet where contacts are: find out, then call it again from that row, ``resumed``.
     With ``last`` < ``first`` everybody decides for the tick that begins the run, and that is all:
-    one entry from Python, because of tables as large as these each takes seconds to compile.
+    one entry from Python, because each has the whole compiled into it.
 
-    room   ``plain``: clock, (1,) substeps made since the start; ``Engine``; ``Robot``;
-           ``Physics``; ``Actors``
-    watch  a ``plain`` ``Watch``
+    room   a packed ``Room``
+    watch  a packed ``Watch``
     """
-    clock, parts, (at, push, touched, drives, tyres, limits), arrays, folk = room
-    marks, scanner, path, travel = watch
-    engine, physics, actors = Engine(*parts), Physics(*arrays), _actors(folk)
-    robot = Robot(at, push, Touches(*touched), drives, tyres, limits)
+    clock, engine, robot = room.clock, room.engine, room.robot
+    physics, actors = room.physics, room.actors
+    marks, scanner, path, travel = watch.marks, watch.scanner, watch.path, watch.travel
     if last < first:
         control(0.0, robot, physics, actors)
         return last
@@ -218,11 +199,11 @@ def loose() -> Pinned:
     return Pinned(none, np.zeros(0), none, none)
 
 
-def unseen(rows: int) -> Any:
-    """A ``plain`` watch over ``rows`` rows that notes the robot alone."""
+def unseen(rows: int) -> Watch:
+    """A watch over ``rows`` rows that notes the robot alone."""
     none, flat = np.zeros(0, dtype=np.int64), np.zeros((0, 3))
     runs, poses = np.zeros((0, 4), dtype=np.int64), np.zeros((0, 0, 12))
     where = (flat, flat, flat, flat, flat, flat, flat)
     scanner = Noted(none, runs, *where, -1, poses, flat, none)
     marks = np.zeros(rows, dtype=np.bool_)
-    return plain(Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 3))))
+    return Watch(marks, scanner, np.zeros((rows, 3)), np.zeros((rows, 3)))

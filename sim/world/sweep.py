@@ -9,11 +9,12 @@ from typing import Any
 
 import numpy as np
 
+from sim.core.packed import packed
 from sim.sensors.lidar.device import STEPS_PER_S, LaserScanner
 from sim.sensors.lidar.schedule import Window
 from sim.sensors.odometry.encoders import WheelOdometry
 from sim.sensors.tag_cameras import TagCameras
-from sim.world.substeps import plain
+from sim.world.substeps import Watch
 from sim.world.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.frames import NS_PER_S, Float, Odometry
@@ -97,7 +98,7 @@ class Sweep:
             self._rows[0][0] = self._rows[0][1]
         if window is not self._window:
             self._window, self.timing = window, ScanTiming.of(laser)
-            self._watch = plain((window.marks, noted, *self._rows))
+            self._watch = packed(Watch(window.marks, noted, *self._rows))
             self.path, self.travel = (rows[: window.last + 1] for rows in self._rows)
         start_ns, phase = world.time_ns, laser.phase
         if phase:

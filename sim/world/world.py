@@ -27,6 +27,7 @@ from sim.core.checks import instance, number
 from sim.core.contacts import Contact, RobotContacts
 from sim.core.dynamism import Dynamism
 from sim.core.engine import engine
+from sim.core.packed import packed
 from sim.core.seeds import Seeds
 from sim.world import sessions, substeps
 from sim.world.populated import crowd_for, crowded, populated, with_visitors
@@ -121,7 +122,7 @@ class World:
         mujoco.mj_forward(self.model, self.data)
         self._pinned = substeps.loose()
         self._room = self._tables()
-        self._unseen = substeps.unseen(2)
+        self._unseen = packed(substeps.unseen(2))
         substeps.advance(0, -1, False, self._room, self._unseen)  # decide, and no more
         mujoco.mj_step1(self.model, self.data)
 
@@ -162,9 +163,10 @@ class World:
         physics = substeps.Physics(data.qpos, data.qvel, data.ctrl, data.qfrc_applied, mocap)
         shoved, rolled = tables(self.model, self._shoves)
         actors = substeps.Actors(
-            self.people.table, self._doors.leaves, shoved, rolled, self._pinned
+            self.people.for_kernels(), self._doors.leaves, shoved, rolled, self._pinned
         )
-        return substeps.plain((self._clock, engine(self.model, data), robot, physics, actors))
+        room = substeps.Room(self._clock, engine(self.model, data), robot, physics, actors)
+        return packed(room)
 
     def _rearranger(self, change: float) -> Rearranging | None:
         number("change", change)
@@ -179,11 +181,6 @@ class World:
     def change(self) -> float:
         """The share of what is out of sight that is put elsewhere."""
         return 0.0 if self._rearranging is None else self._rearranging.share
-
-    def seen_since_drawn(self) -> NDArray[np.bool_]:
-        """(n,) whether each mover was seen since it was last drawn for a change out of sight."""
-        found = self._rearranging
-        return np.zeros(len(self.mover_names), bool) if found is None else found.seen()
 
     def rearrange(self, spec: LaserSpec, *, at_once: bool = False) -> list[Rearrangement]:
         """Between two scans: change what that scanner cannot see now.
@@ -236,7 +233,7 @@ class World:
         self.advance(0, 1, self._unseen)
 
     def advance(self, first: int, last: int, watch: Any) -> None:
-        """Make the substeps that end at rows ``first + 1`` to ``last`` of a ``plain`` ``Watch``."""
+        """Make the substeps that end at rows ``first + 1`` to ``last`` of a packed ``Watch``."""
         row = substeps.advance(first, last, False, self._room, watch)
         if row < last:  # the first touch
             self._contacts.locate(self.data)

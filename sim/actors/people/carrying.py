@@ -111,8 +111,14 @@ def runs_into(  # noqa: PLR0913 (kernel)
 
 
 @inner
-def pushes(
-    i: int, wanted: tuple[float, float], near: Int, field: Field, crowd: Crowd, rows: Int
+def pushes(  # noqa: PLR0913 (kernel)
+    i: int,
+    wanted: tuple[float, float],
+    near: Int,
+    field: Field,
+    crowd: Crowd,
+    held: Held | None,
+    rows: Int,
 ) -> tuple[float, float]:
     """The velocity of someone who pushes a long thing, by the dynamic window of a long vehicle.
 
@@ -120,6 +126,8 @@ def pushes(
     back. What stands in the way of any part of it is waited for, but chairs are pushed along.
     rows: scratch.
     """
+    if held is None:
+        return wanted
     pace, yaw = math.sqrt(wanted[0] ** 2 + wanted[1] ** 2), crowd.yaws[i]
     crowd.state[i].look = yaw
     if pace < 0.05:
@@ -155,9 +163,11 @@ def pushes(
 
 @inner
 def keep_hold(
-    i: int, velocity: tuple[float, float], crowd: Crowd, held: Held, at: Int
+    i: int, velocity: tuple[float, float], crowd: Crowd, held: Held | None, at: Int
 ) -> tuple[float, float]:
     """The velocity of person ``i`` less what would tear it from the thing it holds."""
+    if held is None:
+        return velocity
     vx, vy = velocity
     row = crowd.task[i].held
     for k in range(len(held.at) if row >= 0 else 0):
@@ -237,8 +247,12 @@ def next_turn(i: int, time: float, leaders: Leaders, crowd: Crowd) -> None:
 
 
 @inner
-def to_what_is_taken(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
+def to_what_is_taken(
+    i: int, field: Field, leaders: Leaders, crowd: Crowd, held: Held | None
+) -> tuple[float, float]:
     """The velocity with which person ``i`` goes to the chair to take, or takes it to its place."""
+    if held is None:
+        return 0.0, 0.0
     task = crowd.task[i]
     if task.walking == columns.CLEANS:
         return 0.0, 0.0
@@ -283,13 +297,13 @@ def find_work(i: int, time: float, field: Field, leaders: Leaders, crowd: Crowd)
 
 
 @inner
-def clean(  # noqa: PLR0913 (kernel)
+def clean(  # noqa: C901, PLR0913 (kernel)
     i: int,
     time: float,
     field: Field,
     leaders: Leaders,
     crowd: Crowd,
-    held: Held,
+    held: Held | None,
     at: Int,
     weights: Float,
 ) -> None:
@@ -297,6 +311,8 @@ def clean(  # noqa: PLR0913 (kernel)
 
     A chair that cannot be reached is left; one that cannot be brought to its place is put down.
     """
+    if held is None:
+        return
     task, state, hand = crowd.task, crowd.state, crowd.task[i].hand
     if hand < 0 or task[i].first < 0:
         return

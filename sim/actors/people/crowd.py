@@ -185,7 +185,7 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     elif doing == columns.QUEUES:
         wx, wy = stand_in_line(i, time, people.leaders, crowd)
     else:
-        wx, wy = to_what_is_taken(i, field, people.leaders, crowd)
+        wx, wy = to_what_is_taken(i, field, people.leaders, crowd, people.held)
     if wx * wx + wy * wy > 0.09:
         still = crowd.discs[i].u ** 2 + crowd.discs[i].v ** 2 < STILL * STILL
         # Who stands still with the leader has nowhere to get on to.
@@ -232,7 +232,7 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
         count = nearby(i, crowd, ways.sides, near)
         fade = patience(i, time, crowd)
         if is_pushing(i, crowd):
-            vx, vy = pushes(i, wanted, near[:count], field, crowd, parts)
+            vx, vy = pushes(i, wanted, near[:count], field, crowd, people.held, parts)
         else:
             vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
         before = vx * vx + vy * vy

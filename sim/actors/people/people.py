@@ -6,6 +6,7 @@ from __future__ import annotations
 import functools
 import math
 from collections.abc import Sequence
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -147,6 +148,11 @@ class People:
                 if not hold.hinged:
                     state["turn_rate"][i] = ACTORS.holding.turn_most
         return leaders_of([planar.index(name) for name in leaders], lines.rows)
+
+    def for_kernels(self) -> crowd.People:
+        """``table``; without hands where nobody takes hold of anything, which spares compiling."""
+        none: Any = None
+        return self.table if len(self.table.held.at) else self.table._replace(held=none)
 
     def start(self, data: mujoco.MjData, *, waiting: int = 0) -> None:
         """Draw who everyone is, and put their feet under them where ``data`` says they stand.

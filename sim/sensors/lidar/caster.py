@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from sim.core.packed import packed
 from sim.sensors.lidar import columns as col
 from sim.sensors.lidar import raycast, windows
 from sim.sensors.lidar.candidates import candidates
@@ -67,7 +68,7 @@ class Raycaster:
     Attributes: ``ids`` (n,) geom ids of the candidates; ``lasers`` (slots, 3) x, y, yaw of the
     laser at each ``note`` of the scan; after ``cast``, ``hits`` (ranges m, candidates, |cos| of
     the incidence), each (layers, beams, rays): inf, -1 and NaN for a miss, and ``fan`` (m, 7) the
-    beams in the world; after ``start``, ``noted``, the fields of ``windows.Noted``.
+    beams in the world; after ``start``, ``noted``, a packed ``windows.Noted``.
     """
 
     def __init__(  # noqa: PLR0913 (settings by keyword)
@@ -126,10 +127,11 @@ class Raycaster:
                 data.site_xmat, self._site, self.poses, self.lasers, self._filled,
             )  # fmt: skip
             self._all[:, col.RUN_STATE] = self._runs[:, col.RUN_STATE] = col.MOVES
-            windows.note((self.ids, self._all, np.zeros((len(self._all), 7)), *where))
+            none = np.zeros((len(self._all), 7))
+            windows.note(packed(windows.Noted(self.ids, self._all, none, *where)))
             windows.enclose(self.table, self._all, self.poses, 1, self.bounds)
             self._places = np.zeros((len(self._runs), 7))
-            self.noted = (self.ids, self._runs, self._places, *where)
+            self.noted = packed(windows.Noted(self.ids, self._runs, self._places, *where))
             self._filled[0] = 0
         if before is not None:
             self.poses[0, self._movable], self.lasers[0], self._places[:] = before

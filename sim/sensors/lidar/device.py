@@ -117,7 +117,7 @@ class LaserScanner:
                 self.caster.note()
         return self.finish()
 
-    def begin(self, data: mujoco.MjData) -> tuple[Any, ...]:
+    def begin(self, data: mujoco.MjData) -> Any:
         """Start a scan, whose ``window`` is then known.
 
         Who advances the world calls ``windows.note`` with what is returned at ``window.marks``.

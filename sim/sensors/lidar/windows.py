@@ -49,51 +49,56 @@ class Noted(NamedTuple):
 
 
 @inner
-def _put(row: Float, at: int, values: Float) -> None:
-    """Write ``values`` into ``row`` from ``at`` on; to assign a slice would allocate."""
-    for i in range(len(values)):
-        row[at + i] = values[i]
-
-
-@inner
-def _same(row: Float, at: int, values: Float) -> bool:
-    """Whether ``row`` has these values from ``at`` on."""
-    for i in range(len(values)):  # noqa: SIM110 (kernel)
-        if row[at + i] != values[i]:
+def _stands(place: Float, position: Float, quaternion: Float) -> bool:
+    """Whether a body is where it was, to the last bit."""
+    for i in range(3):
+        if place[i] != position[i]:
+            return False
+    for i in range(4):  # noqa: SIM110 (kernel)
+        if place[3 + i] != quaternion[i]:
             return False
     return True
 
 
-@uncounted
-def note(noted: tuple[Any, ...]) -> None:
-    """Take over where geoms and laser are now, into the next slot.
+@inner
+def _keep(place: Float, position: Float, quaternion: Float) -> None:
+    """Number by number, as all below: an assignment of a slice compiles its error messages."""
+    for i in range(3):
+        place[i] = position[i]
+    for i in range(4):
+        place[3 + i] = quaternion[i]
 
-    noted  ``Noted``, as a plain tuple: a named one costs more than the work
-    """
-    ids, runs, places, xpos, xquat, geom_xpos, geom_xmat = noted[:7]
-    site_xpos, site_xmat, site, poses, lasers, filled = noted[7:]
-    slot = filled[0]
-    filled[0] += 1
+
+@uncounted
+def note(noted: Any) -> None:  # noqa: C901 (kernel)
+    """Take over where geoms and laser are now, into the next slot of a packed ``Noted``."""
+    runs, places, poses, lasers = noted.runs, noted.places, noted.poses, noted.lasers
+    xpos, xquat, site = noted.xpos, noted.xquat, noted.site
+    slot = noted.filled[0]
+    noted.filled[0] += 1
     for k in range(runs.shape[0]):
         body, first, end = runs[k, col.RUN_BODY], runs[k, col.RUN_FIRST], runs[k, col.RUN_END]
         if runs[k, col.RUN_STATE] != col.MOVES:
-            if _same(places[k], 0, xpos[body]) and _same(places[k], 3, xquat[body]):
-                continue  # it stands, to the last bit
+            if _stands(places[k], xpos[body], xquat[body]):
+                continue
             for before in range(1, slot):
                 for j in range(first, end):
-                    _put(poses[before, j], 0, poses[0, j])
+                    for i in range(poses.shape[2]):
+                        poses[before, j, i] = poses[0, j, i]
         runs[k, col.RUN_STATE] = col.MOVES
         if slot == 0:
             runs[k, col.RUN_STATE] = col.PLACED
-            _put(places[k], 0, xpos[body])
-            _put(places[k], 3, xquat[body])
+            _keep(places[k], xpos[body], xquat[body])
         for j in range(first, end):
-            _put(poses[slot, j], col.PX, geom_xpos[ids[j]])
-            _put(poses[slot, j], col.R00, geom_xmat[ids[j]])
+            geom = noted.ids[j]
+            for i in range(3):
+                poses[slot, j, col.PX + i] = noted.geom_xpos[geom, i]
+            for i in range(9):
+                poses[slot, j, col.R00 + i] = noted.geom_xmat[geom, i]
     if site >= 0:
-        lasers[slot, col.LASER_X] = site_xpos[site, 0]
-        lasers[slot, col.LASER_Y] = site_xpos[site, 1]
-        lasers[slot, col.LASER_YAW] = math.atan2(site_xmat[site, 3], site_xmat[site, 0])
+        lasers[slot, col.LASER_X] = noted.site_xpos[site, 0]
+        lasers[slot, col.LASER_Y] = noted.site_xpos[site, 1]
+        lasers[slot, col.LASER_YAW] = math.atan2(noted.site_xmat[site, 3], noted.site_xmat[site, 0])
 
 
 @inner

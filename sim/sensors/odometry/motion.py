@@ -73,7 +73,8 @@ def _accumulate(
     bx, by, bx_angle, by_angle = _turned(distance, angle)
     unit_x, unit_y, _, _ = _turned(1.0, angle)
     c, s = math.cos(increment[2]), math.sin(increment[2])
-    carry = np.eye(3)
+    carry = np.zeros((3, 3))
+    carry[0, 0] = carry[1, 1] = carry[2, 2] = 1.0
     carry[0, 2] = -s * bx - c * (by + side)
     carry[1, 2] = c * bx - s * (by + side)
     # Columns: what one unit of distance, side, angle does to the increment.
@@ -186,8 +187,11 @@ def close(poses: Float, spread: Float, variances: Vec3) -> None:
                 total += systematic[i, k] * variances[k] * systematic[j, k]
             out[i, j] = out[j, i] = total
         out[i, i] += FLOOR
-    poses[AT_STAMP] = poses[NOW]
-    poses[INCREMENT], spread[:2] = 0.0, 0.0
+    for i in range(3):
+        poses[AT_STAMP, i] = poses[NOW, i]
+        poses[INCREMENT, i] = 0.0
+        for j in range(3):
+            random[i, j] = systematic[i, j] = 0.0
 
 
 @inner

@@ -7,6 +7,7 @@ import mujoco
 import numpy as np
 
 from sim.core.engine import Engine, call, engine
+from sim.core.packed import packed
 from sim.world import substeps
 from sim.world.world import World
 from slam._jit import njit
@@ -48,12 +49,12 @@ def test_many_substeps_at_once_are_single_ones():
     """Also where the robot runs into something."""
     worlds = [World("arena", seed=100, dynamism=0.9) for _ in range(2)]
     watch = substeps.unseen(9)
-    _, _, path, travel = watch
+    path, travel = watch.path, watch.travel
     touched: list[list[str]] = [[], []]
     for world in worlds:
         world.set_command(1.0, 0.0)
     for _ in range(180):
-        worlds[0].advance(0, 8, watch)
+        worlds[0].advance(0, 8, packed(watch))
         for k in range(8):
             worlds[1].substep()
             np.testing.assert_array_equal(path[k + 1], worlds[1].robot_pose())
@@ -62,3 +63,15 @@ def test_many_substeps_at_once_are_single_ones():
             names += [str(contact) for contact in world.take_contacts()]
     assert touched[0] == touched[1] != []
     assert worlds[0].save_state() == worlds[1].save_state()
+
+
+def test_rooms_are_of_two_types_with_and_without_hands():
+    """Each type is compiled for itself, for seconds: what else stands in a room must make none."""
+    free = [
+        World("arena", seed=1, crowd="none"),
+        World("office", seed=2, dynamism=0.9, n_chairs=3, crowd="escorts:2,queue:2"),
+    ]
+    held = [World("arena", seed=1, crowd=crowd) for crowd in ("boards:1", "cleaners:1")]
+    types = [{world._room._numba_type_ for world in worlds} for worlds in (free, held)]
+    assert [len(each) for each in types] == [1, 1]
+    assert types[0] != types[1]
