@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-from functools import cache
-
-from scenes.plan import Plan
-from scenes.recipe import Draws, count, finish, furnished
+from scenes.recipe import Draws, count, finish, furnished, planned
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -25,15 +22,7 @@ def apartment(
     ``doors``: how they rest, "open", "ajar", "closed" or "mixed".
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 6), count("n_people", n_people, 2)
-    builder = furnished(_plan(), Draws(seed), n_chairs, n_people, doors)
+    builder = furnished(planned("apartment", FURNITURE), Draws(seed), n_chairs, n_people, doors)
     return finish(
         builder, "apartment", seed, {"n_chairs": n_chairs, "n_people": n_people, "doors": doors}
     )
-
-
-@cache
-def _plan() -> Plan:
-    plan = Plan("apartment")
-    plan.furnish_marks(FURNITURE)
-    plan.frame_doors()
-    return plan.finish()

@@ -9,11 +9,7 @@ the laser reaches.
 
 from __future__ import annotations
 
-from functools import cache
-
-from scenes.builder import Builder
-from scenes.plan import Plan
-from scenes.recipe import Draws, choice, count, finish, free_floor, scatter, seat_chairs
+from scenes.recipe import Draws, choice, count, finish, furnished, planned
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -31,18 +27,7 @@ def arena(
     n_chairs = count("n_chairs", n_chairs, 16)
     n_people = count("n_people", n_people, 0)
     walls = choice("walls", walls, WALLS)
-    draws = Draws(seed)
-    builder = Builder(_plan(walls))
-    floor = free_floor(builder)
-    seat_chairs(builder, floor, (), n_chairs, draws)
-    scatter(builder, floor, "person", n_people, draws, draws.people)
+    plan = planned("arena", hidden=walls == "none")
+    builder = furnished(plan, Draws(seed), n_chairs, n_people)
     options = {"n_chairs": n_chairs, "n_people": n_people, "walls": walls}
     return finish(builder, "arena", seed, options)
-
-
-@cache
-def _plan(walls: str) -> Plan:
-    plan = Plan("arena")
-    if walls == "none":
-        plan.hide_walls()
-    return plan.finish()

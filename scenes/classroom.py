@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-from functools import cache
-
-from scenes.plan import Plan
-from scenes.recipe import Draws, count, finish, furnished, switch
+from scenes.recipe import Draws, count, finish, furnished, planned, switch
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -29,16 +26,7 @@ def classroom(
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 34), count("n_people", n_people, 4)
     glass = switch("glass", glass)
-    builder = furnished(_plan(glass), Draws(seed), n_chairs, n_people, doors)
+    plan = planned("classroom", FURNITURE, glazed=("hall_a", "hall_b") if glass else ())
+    builder = furnished(plan, Draws(seed), n_chairs, n_people, doors)
     options = {"n_chairs": n_chairs, "n_people": n_people, "glass": glass, "doors": doors}
     return finish(builder, "classroom", seed, options)
-
-
-@cache
-def _plan(glass: bool) -> Plan:
-    plan = Plan("classroom")
-    plan.furnish_marks(FURNITURE)
-    plan.frame_doors()
-    for wall in ("hall_a", "hall_b") if glass else ():
-        plan.glaze(wall)
-    return plan.finish()

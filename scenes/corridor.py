@@ -7,11 +7,7 @@ slide along it; only odometry, and a niche near each end, tell places apart.
 
 from __future__ import annotations
 
-from functools import cache
-
-from scenes.builder import Builder
-from scenes.plan import Plan
-from scenes.recipe import Draws, count, finish, free_floor, scatter, seat_chairs
+from scenes.recipe import Draws, count, finish, furnished, planned
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -20,17 +16,6 @@ from scenes.scene import Scene
 def corridor(seed: int, *, n_chairs: int | None = None, n_people: int | None = None) -> Scene:
     """40 x 2.4 m and featureless: ``n_chairs`` (4) chairs at its ends, ``n_people`` (2) people."""
     n_chairs, n_people = count("n_chairs", n_chairs, 4), count("n_people", n_people, 2)
-    draws = Draws(seed)
-    plan = _plan()
-    builder = Builder(plan)
-    floor = free_floor(builder)
-    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
-    scatter(builder, floor, "person", n_people, draws, draws.people)
+    plan = planned("corridor", ("cabinet", "plant"))
+    builder = furnished(plan, Draws(seed), n_chairs, n_people)
     return finish(builder, "corridor", seed, {"n_chairs": n_chairs, "n_people": n_people})
-
-
-@cache
-def _plan() -> Plan:
-    plan = Plan("corridor")
-    plan.furnish_marks(("cabinet", "plant"))
-    return plan.finish()

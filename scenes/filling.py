@@ -7,24 +7,11 @@
 from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
-from functools import cache
 from pathlib import Path
 
-from scenes.builder import Builder
 from scenes.kinds import kind_of
-from scenes.plan import Plan, furniture
-from scenes.recipe import (
-    Draws,
-    count,
-    finish,
-    free_floor,
-    hang_doors,
-    park,
-    put_bins,
-    put_movers,
-    scatter,
-    seat_chairs,
-)
+from scenes.plan import furniture
+from scenes.recipe import Draws, count, finish, furnished, planned
 from scenes.scene import Pose, Scene
 
 
@@ -52,27 +39,11 @@ def filled(  # noqa: PLR0913 (the counts of a scene, each by name)
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 0), count("n_people", n_people, 0)
     more = tuple((str(part), (pose[0], pose[1], pose[2])) for part, pose in put)
-    walls = _plan(str(plan), tuple(map(str, parts)), more)
-    builder, draws = Builder(walls), Draws(seed)
-    hang_doors(builder, draws.doors, doors)
-    put_bins(builder, draws.bins)
-    put_movers(builder, walls.put)
-    floor = free_floor(builder)
-    seat_chairs(builder, floor, walls.seats, n_chairs, draws)
-    for kind, n in (loads or {}).items():
+    walls = planned(str(plan), (*map(str, parts), *furniture()), put=more)
+    for kind in loads or {}:
         kind_of(kind)  # an unknown one is refused with the kinds that there are
-        park(builder, floor, kind, count(f"loads[{kind!r}]", n, 0), draws.cargo)
-    scatter(builder, floor, "person", n_people, draws, draws.people)
+    loaded = {kind: count(f"loads[{kind!r}]", n, 0) for kind, n in (loads or {}).items()}
+    builder = furnished(walls, Draws(seed), n_chairs, n_people, doors, loaded)
     options: dict[str, object] = {"n_chairs": n_chairs, "n_people": n_people, "doors": doors}
     options |= {"loads": dict(loads)} if loads else {}
     return finish(builder, Path(plan).stem, seed, options)
-
-
-@cache
-def _plan(source: str, parts: tuple[str, ...], put: tuple[tuple[str, Pose], ...]) -> Plan:
-    plan = Plan(source)
-    plan.furnish_marks([*parts, *furniture()])
-    for part, pose in put:
-        plan.furnish(part, pose)
-    plan.frame_doors()
-    return plan.finish()

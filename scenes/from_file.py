@@ -18,23 +18,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.assembly import moved, part_marks, reach_of
-from scenes.builder import Builder
 from scenes.from_map.survey import Cells, survey
 from scenes.kinds import KINDS
 from scenes.placement import gap_to_boxes
 from scenes.plan import Plan, furniture
-from scenes.recipe import (
-    MARGIN,
-    START_RADIUS,
-    Draws,
-    finish,
-    free_floor,
-    hang_doors,
-    put_bins,
-    put_movers,
-    scatter,
-    seat_chairs,
-)
+from scenes.recipe import MARGIN, START_RADIUS, Draws, finish, furnished
 from scenes.scene import Pose, Scene
 from scenes.scene_file import Box, SceneFile, Thing, Wanted, read
 from slam.bounded import check_file
@@ -44,7 +32,6 @@ CELL_M, RIM_M = 0.05, 0.6  # cells on which the floor inside drawn walls is foun
 BESIDE_M = 0.3  # a thing that near to a room is on its floor
 MAX_CELLS = 1 << 26
 FLOOR = "floor_concrete"
-Movers = tuple[tuple[str, Pose], ...]
 
 
 def recipe(name: str) -> Callable[..., Scene]:
@@ -72,9 +59,8 @@ def recipe(name: str) -> Callable[..., Scene]:
     return from_file
 
 
-def plan_of(file: SceneFile, wanted: Wanted) -> tuple[Plan, Movers]:
-    """The plan of a file, and what it puts that can move; made once while the files stay as they
-    are."""
+def plan_of(file: SceneFile, wanted: Wanted) -> Plan:
+    """The plan of a file; made once while the files stay as they are."""
     files = [file.path] if file.plan is None else [file.path, file.plan]
     for path in files:
         check_file(path)
@@ -83,20 +69,15 @@ def plan_of(file: SceneFile, wanted: Wanted) -> tuple[Plan, Movers]:
 
 
 def _scene(file: SceneFile, wanted: Wanted, seed: int) -> Scene:
-    plan, movers = plan_of(file, wanted)
-    builder, draws = Builder(plan), Draws(seed)
-    hang_doors(builder, draws.doors, "open" if wanted.doors == "none" else wanted.doors)
-    put_bins(builder, draws.bins)
-    put_movers(builder, movers)
-    floor = free_floor(builder)
-    seat_chairs(builder, floor, plan.seats, wanted.n_chairs, draws)
-    scatter(builder, floor, "person", wanted.n_people, draws, draws.people)
+    doors = "open" if wanted.doors == "none" else wanted.doors
+    plan = plan_of(file, wanted)
+    builder = furnished(plan, Draws(seed), wanted.n_chairs, wanted.n_people, doors)
     options = {key: getattr(wanted, key) for key in Wanted.__dataclass_fields__}
     return finish(builder, file.path.stem, seed, options)
 
 
 @lru_cache(maxsize=16)
-def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> tuple[Plan, Movers]:
+def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> Plan:
     plan = _drawn(file) if file.plan is None else Plan(str(file.plan))
     if wanted.doors == "none":
         plan.marks = tuple(mark for mark in plan.marks if mark.words[0] != "door")
@@ -106,16 +87,18 @@ def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> tuple[Pl
             plan.furnish(part, pose)
     if not wanted.seats:
         plan.seats = list(plan.find("seat"))
-    movers, standing = _movers(file, wanted, plan)
+    plan.put, standing = _movers(file, wanted, plan)
     for k, (x, y, a, b, yaw) in enumerate(standing):
         plan.wall(f"thing{k}", (x, y), (a, b), yaw)
     for k, (hand, pose) in enumerate(file.hinges if wanted.doors != "none" else ()):
         plan.mark(f"door:{k}:{hand}", pose)
     plan.frame_doors()
-    return plan.finish(), movers
+    return plan.finish()
 
 
-def _movers(file: SceneFile, wanted: Wanted, plan: Plan) -> tuple[Movers, list[Box]]:
+def _movers(
+    file: SceneFile, wanted: Wanted, plan: Plan
+) -> tuple[list[tuple[str, Pose]], list[Box]]:
     """What moves, and the boxes of things that do not: kept, off the floor, or without room."""
     own = [(kind, pose) for kind, pose in file.put if kind in KINDS]
     movers, boxes = [*plan.put, *own], plan.boxes
@@ -131,7 +114,7 @@ def _movers(file: SceneFile, wanted: Wanted, plan: Plan) -> tuple[Movers, list[B
             movers.append((thing.kind, thing.at))
         else:
             standing += thing.boxes
-    return tuple(movers), standing
+    return movers, standing
 
 
 def _has_room(

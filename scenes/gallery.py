@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-from functools import cache
-
-from scenes.plan import Plan
-from scenes.recipe import Draws, count, finish, furnished
+from scenes.recipe import Draws, count, finish, furnished, planned
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -18,13 +15,5 @@ FURNITURE = (*EXHIBITS, "bench", "desk", "cabinet", "plant")
 def gallery(seed: int, *, n_chairs: int | None = None, n_people: int | None = None) -> Scene:
     """24 x 16 m, ``n_people`` (8) visitors, ``n_chairs`` (4) chairs of the guards."""
     n_chairs, n_people = count("n_chairs", n_chairs, 4), count("n_people", n_people, 8)
-    builder = furnished(_plan(), Draws(seed), n_chairs, n_people, "open")
+    builder = furnished(planned("gallery", FURNITURE), Draws(seed), n_chairs, n_people)
     return finish(builder, "gallery", seed, {"n_chairs": n_chairs, "n_people": n_people})
-
-
-@cache
-def _plan() -> Plan:
-    plan = Plan("gallery")
-    plan.furnish_marks(FURNITURE)
-    plan.frame_doors()
-    return plan.finish()

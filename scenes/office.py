@@ -3,10 +3,7 @@
 
 from __future__ import annotations
 
-from functools import cache
-
-from scenes.plan import Plan
-from scenes.recipe import Draws, count, finish, furnished, switch
+from scenes.recipe import Draws, count, finish, furnished, planned, switch
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -29,16 +26,7 @@ def office(
     """
     n_chairs, n_people = count("n_chairs", n_chairs, 24), count("n_people", n_people, 6)
     glass = switch("glass", glass)
-    builder = furnished(_plan(glass), Draws(seed), n_chairs, n_people, doors)
+    plan = planned("office", FURNITURE, glazed=("meeting_lounge",) if glass else ())
+    builder = furnished(plan, Draws(seed), n_chairs, n_people, doors)
     options = {"n_chairs": n_chairs, "n_people": n_people, "glass": glass, "doors": doors}
     return finish(builder, "office", seed, options)
-
-
-@cache
-def _plan(glass: bool) -> Plan:
-    plan = Plan("office")
-    plan.furnish_marks(FURNITURE)
-    plan.frame_doors()
-    if glass:
-        plan.glaze("meeting_lounge")
-    return plan.finish()

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections.abc import Mapping, Sequence
+from functools import cache
 
 import numpy as np
 
@@ -156,13 +157,50 @@ def scatter(
         floor.block(pose[0], pose[1], reach_of(kind))
 
 
-def furnished(plan: Plan, draws: Draws, n_chairs: int, n_people: int, doors: str) -> Builder:
-    """Rooms with doors, a bin at each mark, chairs at the seats and people anywhere."""
+@cache
+def planned(
+    name: str,
+    parts: tuple[str, ...] = (),
+    *,
+    put: tuple[tuple[str, Pose], ...] = (),
+    glazed: tuple[str, ...] = (),
+    hidden: bool = False,
+) -> Plan:
+    """A plan of ``scenes/plans``, or the path of one, with its furniture and the frames of doors.
+
+    parts   put wherever a mark starts with their name; ``put``: also where no mark is
+    glazed  walls that are panes; ``hidden``: nobody sees the walls
+    """
+    plan = Plan(name)
+    if hidden:
+        plan.hide_walls()
+    plan.furnish_marks(parts)
+    for part, pose in put:
+        plan.furnish(part, pose)
+    plan.frame_doors()
+    for wall in glazed:
+        plan.glaze(wall)
+    return plan.finish()
+
+
+def furnished(
+    plan: Plan,
+    draws: Draws,
+    n_chairs: int,
+    n_people: int,
+    doors: str = "open",
+    loads: Mapping[Kind, int] | None = None,
+) -> Builder:
+    """Rooms with doors, bins and what the plan puts at its marks, chairs at the seats, loads by
+    kind at their spots, and people anywhere."""
     builder = Builder(plan)
     hang_doors(builder, draws.doors, doors)
     put_bins(builder, draws.bins)
+    put_movers(builder, plan.put)
     floor = free_floor(builder)
     seat_chairs(builder, floor, plan.seats, n_chairs, draws)
+    for kind, n in (loads or {}).items():
+        park(builder, floor, kind, n, draws.cargo)
     scatter(builder, floor, "person", n_people, draws, draws.people)
     return builder
 

@@ -3,21 +3,7 @@
 
 from __future__ import annotations
 
-from functools import cache
-
-from scenes.builder import Builder
-from scenes.plan import Plan
-from scenes.recipe import (
-    Draws,
-    count,
-    finish,
-    free_floor,
-    hang_doors,
-    park,
-    put_bins,
-    scatter,
-    seat_chairs,
-)
+from scenes.recipe import Draws, count, finish, furnished, planned
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -35,21 +21,8 @@ def station(
 ) -> Scene:
     """40 x 25 m: ``n_people`` (12), ``n_trolleys`` (4) for luggage, ``n_chairs`` (6)."""
     n_trolleys, n_chairs = count("n_trolleys", n_trolleys, 4), count("n_chairs", n_chairs, 6)
-    n_people, draws = count("n_people", n_people, 12), Draws(seed)
-    plan = _plan()
-    builder = Builder(plan)
-    hang_doors(builder, draws.doors)
-    put_bins(builder, draws.bins)
-    floor = free_floor(builder)
-    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
-    park(builder, floor, "trolley", n_trolleys, draws.cargo)
-    scatter(builder, floor, "person", n_people, draws, draws.people)
+    n_people = count("n_people", n_people, 12)
+    plan, loads = planned("station", FURNITURE), {"trolley": n_trolleys}
+    builder = furnished(plan, Draws(seed), n_chairs, n_people, loads=loads)
     options = {"n_trolleys": n_trolleys, "n_chairs": n_chairs, "n_people": n_people}
     return finish(builder, "station", seed, options)
-
-
-@cache
-def _plan() -> Plan:
-    plan = Plan("station")
-    plan.furnish_marks(FURNITURE)
-    return plan.finish()

@@ -3,11 +3,7 @@
 
 from __future__ import annotations
 
-from functools import cache
-
-from scenes.builder import Builder
-from scenes.plan import Plan
-from scenes.recipe import Draws, count, finish, free_floor, park, put_bins, scatter, seat_chairs
+from scenes.recipe import Draws, count, finish, furnished, planned
 from scenes.registry import register
 from scenes.scene import Scene
 
@@ -26,15 +22,9 @@ def warehouse(
     """24 x 16 m: ``n_trolleys`` (8), ``n_pallets`` (14), ``n_people`` (4), ``n_chairs`` (2)."""
     n_trolleys, n_pallets = count("n_trolleys", n_trolleys, 8), count("n_pallets", n_pallets, 14)
     n_chairs, n_people = count("n_chairs", n_chairs, 2), count("n_people", n_people, 4)
-    draws = Draws(seed)
-    plan = _plan()
-    builder = Builder(plan)
-    put_bins(builder, draws.bins)
-    floor = free_floor(builder)
-    seat_chairs(builder, floor, plan.seats, n_chairs, draws)
-    park(builder, floor, "pallet", n_pallets, draws.cargo)
-    park(builder, floor, "trolley", n_trolleys, draws.cargo)
-    scatter(builder, floor, "person", n_people, draws, draws.people)
+    loads = {"pallet": n_pallets, "trolley": n_trolleys}
+    plan = planned("warehouse", FURNITURE)
+    builder = furnished(plan, Draws(seed), n_chairs, n_people, loads=loads)
     options = {
         "n_trolleys": n_trolleys,
         "n_pallets": n_pallets,
@@ -42,10 +32,3 @@ def warehouse(
         "n_people": n_people,
     }
     return finish(builder, "warehouse", seed, options)
-
-
-@cache
-def _plan() -> Plan:
-    plan = Plan("warehouse")
-    plan.furnish_marks(FURNITURE)
-    return plan.finish()

@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import logging
+import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
 from contextlib import contextmanager, suppress
+from functools import wraps
+from typing import ParamSpec
 
 from rich import box
 from rich.console import Console
@@ -25,11 +28,12 @@ from rich.progress import (
 from rich.table import Table
 from rich.text import Text
 
-from slam.errors import printable
+from slam.errors import MobiliaError, printable
 
 LINE_EVERY_S = 10.0  # between lines of progress where the output is no terminal
 console = Console(emoji=False)  # "seat:chair:0" is a mark, and no picture of a chair
 _errors = Console(stderr=True, emoji=False)
+P = ParamSpec("P")
 
 
 def plain(words: str) -> str:
@@ -42,6 +46,20 @@ def fail(message: str) -> None:
     _errors.print(
         f"[bold red]mobilia:[/bold red] {plain(message)}", highlight=False, soft_wrap=True
     )
+
+
+def ended(main: Callable[P, int | None]) -> Callable[P, int]:
+    """``main`` as a command: its exit status; an error of ours ends it with 1, told in one line."""
+
+    @wraps(main)
+    def command(*words: P.args, **named: P.kwargs) -> int:
+        try:
+            return main(*words, **named) or 0
+        except (MobiliaError, OSError) as error:
+            print(error, file=sys.stderr)
+            return 1
+
+    return command
 
 
 def note(message: str) -> None:

@@ -220,17 +220,6 @@ def error_series(track: Trajectory, truth: Trajectory) -> tuple[Float, Float, Fl
     return seconds, np.maximum(offset, 1e-3), se2.wrap_array(delta[:, 2])
 
 
-def in_first_frame(truth: Trajectory) -> Trajectory:
-    """The truth as seen from its own first pose, the frame in which a SLAM starts."""
-    T_first_world = se2.inverse(truth.poses[0])
-    return Trajectory(
-        stamps_ns=truth.stamps_ns,
-        poses=np.array(
-            [se2.compose(T_first_world, T_world_robot) for T_world_robot in truth.poses]
-        ),
-    )
-
-
 @contextmanager
 def _over_map(path: Path, raster: Raster, track: Trajectory, title: str) -> Iterator[Axes]:
     """Axes to draw the map on, of its shape; the trajectory comes over it, then it is saved."""

@@ -14,6 +14,7 @@ import csv
 import io
 import os
 import re
+from collections.abc import Iterable, Sequence
 from pathlib import Path
 
 from slam.errors import InvalidValueError
@@ -22,6 +23,13 @@ from slam.files import write_text
 MOST_CELLS = 40  # of a table on a page
 _TABLE = re.compile(r"(?:^\|.*\|\n?){3,}", re.MULTILINE)
 SUM = "all"  # how those rows of a long table begin that stay on the page
+
+
+def table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1) -> str:
+    """A table in Markdown: the first ``left`` columns are words, the others numbers."""
+    rule = [*["---"] * left, *["---:"] * (len(heads) - left)]
+    each = ([cell.replace("|", "/") for cell in row] for row in (heads, rule, *rows))
+    return "\n".join("| " + " | ".join(row) + " |" for row in each)
 
 
 def filled(text: str, name: str, told: str, page: object) -> str:
@@ -61,12 +69,12 @@ def with_tables_apart(
     """
     count = 0
 
-    def apart(table: re.Match[str]) -> str:
+    def apart(found: re.Match[str]) -> str:
         nonlocal count
-        lines = table[0].strip().splitlines()
+        lines = found[0].strip().splitlines()
         head, *rows = ([cell.strip() for cell in line[1:-1].split("|")] for line in lines)
         if len(head) * len(rows[1:]) <= most:
-            return table[0]
+            return found[0]
         count += 1
         path = results / (f"{stem}.csv" if count == 1 else f"{stem}_{count}.csv")
         text = io.StringIO()

@@ -16,7 +16,7 @@ WORDS = "mobilia.words"  # of the command line, in a context
 # Fields that are called otherwise than their option; of several the first that the verb has.
 OPTIONS_OF: dict[str, tuple[str, ...]] = {
     "Plan.slams": ("--slam",),
-    "Plan.scenes": ("--scene",),
+    "Plan.scenes": ("--scene", "scene"),
     "Plan.levels": ("--dynamism",),
     "Plan.dynamisms": ("--dynamism",),
     "Limits.scan_s": ("--scan-limit",),

@@ -13,12 +13,13 @@ import time
 from collections.abc import Iterable, Iterator
 from contextlib import contextmanager, suppress
 from pathlib import Path
+from statistics import median
 from typing import NamedTuple
 
 from scripts.console import in_time, say
 from slam.files import make_folder, write_text
 
-KEPT = 0.6  # of a rate that is known, when another is measured
+KEPT = 0.6  # of a rate that is known, when a slower one is measured
 MOST_KINDS = 1000  # in the file; the oldest go first
 MOST_BYTES = 1 << 20
 
@@ -51,12 +52,15 @@ def _is_rate(value: object) -> bool:
 
 
 def learn(spent: Iterable[tuple[Work, float]]) -> None:
-    """Take in how many seconds each piece of work took. Where nothing can be kept, nothing is."""
+    """Take in how many seconds each piece of work took. Where nothing can be kept, nothing is.
+
+    A faster one stands at once: a slower one may have compiled, or shared the machine.
+    """
     known = rates()
     for work, seconds in spent:
         rate = seconds / max(work.amount, 1e-9)
         before = known.pop(work.kind, rate)
-        known[work.kind] = KEPT * before + (1.0 - KEPT) * rate
+        known[work.kind] = min(rate, KEPT * before + (1.0 - KEPT) * rate)
     with suppress(OSError):
         make_folder(state().parent)
         write_text(state(), json.dumps(dict(list(known.items())[-MOST_KINDS:])) + "\n")
@@ -71,8 +75,8 @@ def timed(work: Work) -> Iterator[None]:
 
 
 def estimate(works: Iterable[Work], processes: int = 1) -> float | None:
-    """s; a kind that has not run here takes as long as the slowest one like it, another SLAM's or
-    scene's; None where there is none."""
+    """s; a kind that has not run here takes as long as the middle one of those like it, another
+    SLAM's or scene's; None where there is none."""
     known = rates()
     each = [work.amount * known.get(work.kind, _like(work.kind, known)) for work in works]
     whole = max(sum(each) / max(processes, 1), max(each, default=0.0))
@@ -82,7 +86,7 @@ def estimate(works: Iterable[Work], processes: int = 1) -> float | None:
 def _like(kind: str, known: dict[str, float]) -> float:
     like = kind.rpartition(" ")[0]
     found = [rate for other, rate in known.items() if other.rpartition(" ")[0] == like]
-    return max(found, default=math.nan)
+    return median(found) if found else math.nan
 
 
 def announce(what: str, works: Iterable[Work], processes: int = 1) -> None:

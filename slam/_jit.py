@@ -41,12 +41,13 @@ P = ParamSpec("P")
 R = TypeVar("R")
 
 
-def njit(function: Callable[P, R]) -> Callable[P, R]:
+def njit(function: Callable[P, R], *, counted: bool = True) -> Callable[P, R]:
     """``numba.njit`` without the interpreter's lock, and with a cache where one can be written."""
     global _cache_is_writable
+    options = {**_OPTIONS, "_nrt": counted}
     if _cache_is_writable:
         try:
-            cached: Callable[P, R] = numba.njit(cache=True, **_OPTIONS)(function)
+            cached: Callable[P, R] = numba.njit(cache=True, **options)(function)
             _watch_callees(cached, function)
             return cached
         except RuntimeError as error:  # "cannot cache function ...: no locator available"
@@ -57,8 +58,17 @@ def njit(function: Callable[P, R]) -> Callable[P, R]:
                 "no folder for compiled code can be written (set NUMBA_CACHE_DIR to one that can): "
                 "compiling again, which takes some seconds in every process"
             )
-    compiled: Callable[P, R] = numba.njit(**_OPTIONS)(function)
+    compiled: Callable[P, R] = numba.njit(**options)(function)
     return compiled
+
+
+def uncounted(function: Callable[P, R]) -> Callable[P, R]:
+    """``njit`` that counts no references to arrays, nor do the ``inner`` kernels that it calls.
+
+    For kernels that allocate nothing (Numba refuses what would) and return no array, so that all
+    arrays are the caller's. Counting them was a tenth of a step of the office.
+    """
+    return njit(function, counted=False)
 
 
 def inner(function: Callable[P, R], **options: bool) -> Callable[P, R]:

@@ -50,15 +50,10 @@ def _check_near(what: str, poses: Float) -> None:
 def asked_map(system: SlamSystem) -> Raster | None:
     """The map now, None for none or an empty one; ``SlamFailedError`` for what no map can be."""
     with judged():
-        raster: object = system.map()
-    return as_map(raster)
-
-
-def as_map(raster: object) -> Raster | None:
-    """That map; ``SlamFailedError`` for what no map can be."""
-    if raster is None:
+        found: object = system.map()
+    if found is None:
         return None
-    raster = _of(Raster, raster, " or None")
+    raster = _of(Raster, found, " or None")
     if raster.T_map_origin[2] != 0.0:
         raise SlamFailedError(
             "returned a map that does not lie along the map's axes, its origin is turned by "

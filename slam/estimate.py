@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping
 from dataclasses import dataclass, field
-from typing import Any, NamedTuple
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -69,21 +69,6 @@ class Raster:
             raise InvalidValueError(f"Raster.resolution_m must be > 0 m, got {self.resolution_m}")
         origin = pose("Raster", "T_map_origin", self.T_map_origin)
         set_fields(self, values=values, T_map_origin=origin)
-
-
-SQUARE = 256  # cells along the edge of a square of ``MapSquares``
-
-
-class MapSquares(NamedTuple):
-    """Where a map has cells, for who reads it in parts.
-
-    resolution_m  edge of a cell, m
-    places        (n, 2) int64 row and column of squares of ``SQUARE`` x ``SQUARE`` cells, counted
-                  from the origin of the map frame along its axes; elsewhere nothing is
-    """
-
-    resolution_m: float
-    places: NDArray[np.int64]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -20,7 +20,6 @@ from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Raster
 from slam.files import part_of, put, replacing, sync, sync_names, unfinished
-from slam.strips import MapStrips, of_raster
 
 OCCUPIED_THRESHOLD = 0.65
 # ROS 1's value. nav2's map_saver writes 0.25, with which a map_server takes the unknown gray 205
@@ -43,18 +42,16 @@ _EDITED = ": the sum differs (after a change on purpose, delete the two lines of
 _IMAGE_SUM, _FIELDS_SUM = "sha256 of the image:", "sha256 of the lines below:"
 
 
-def write_map(stem: Path, map_: Raster | MapStrips) -> tuple[Path, Path]:
+def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
     """``<stem>.pgm`` and ``<stem>.yaml``; returns the two paths.
 
     Values above 0.65 are occupied (black), below 0.196 free, all between and NaN unknown: what a
     map_server in "trinary" mode makes of them. Two comments at the head of the YAML, which a
-    map_server skips, hold sums of the image and of the fields, for ``read_map``. The image is
-    written a strip at a time. Raises ``OutputError`` when they cannot be written and
-    ``InvalidValueError`` for a map without cells or with more than ``MAX_PIXELS``.
+    map_server skips, hold sums of the image and of the fields, for ``read_map``. Raises
+    ``OutputError`` when they cannot be written and ``InvalidValueError`` for a map without cells or
+    with more than ``MAX_PIXELS``.
     """
-    raster = of_raster(map_) if isinstance(map_, Raster) else map_
-    height, width = raster.shape
-    _check_cells(height * width, raster.shape)
+    _check_cells(raster.values.size, raster.values.shape)
     pgm, yaml = stem.with_name(stem.name + ".pgm"), stem.with_name(stem.name + ".yaml")
     x, y, yaw = raster.T_map_origin.tolist()
     lines = [
@@ -76,20 +73,18 @@ def write_map(stem: Path, map_: Raster | MapStrips) -> tuple[Path, Path]:
     return pgm, yaml
 
 
-def _write_pgm(path: Path, map_: MapStrips) -> str:
+def _write_pgm(path: Path, raster: Raster) -> str:
     """Write the image, highest y first; its sum."""
-    height, width = map_.shape
-    digest = hashlib.sha256()
+    height, width = raster.values.shape
+    gray = np.full((height, width), UNKNOWN, np.uint8)
+    np.copyto(gray, OCCUPIED, where=raster.values > OCCUPIED_THRESHOLD)  # false for NaN
+    np.copyto(gray, FREE, where=raster.values < FREE_THRESHOLD)
+    header, pixels = f"P5\n{width} {height}\n255\n".encode("ascii"), gray[::-1].tobytes()
     with path.open("wb") as file:
-        header = f"P5\n{width} {height}\n255\n".encode("ascii")
-        digest.update(header)
         file.write(header)
-        for first, last in reversed(list(map_.strips())):
-            strip = np.full((last - first, width), UNKNOWN, np.uint8)
-            for column, values in map_.pieces(first, last):
-                _paint(strip[::-1, column : column + values.shape[1]], values)
-            digest.update(strip)
-            file.write(strip)
+        file.write(pixels)
+    digest = hashlib.sha256(header)
+    digest.update(pixels)
     return digest.hexdigest()
 
 
@@ -184,12 +179,6 @@ def raster_image(raster: Raster) -> NDArray[np.uint8]:
 def _check_cells(count: int, shape: tuple[int, ...]) -> None:
     if not 0 < count <= MAX_PIXELS:
         raise InvalidValueError(f"a map file needs 1 to {MAX_PIXELS} cells, got shape {shape}")
-
-
-def _paint(gray: NDArray[np.uint8], values: NDArray[np.float32]) -> None:
-    """What is known, over ``UNKNOWN``."""
-    np.copyto(gray, OCCUPIED, where=values > OCCUPIED_THRESHOLD)  # false for NaN
-    np.copyto(gray, FREE, where=values < FREE_THRESHOLD)
 
 
 def _plain(value: float) -> str:

@@ -28,8 +28,7 @@ KINDS = {
 }
 OPTIONAL = (
     # the optional protocols of ``slam.system``
-    "landmarks", "changes", "save", "cells_hold", "map_part", "map_squares",
-    "changes_part", "poses_in_map",
+    "landmarks", "changes", "save", "cells_hold", "poses_in_map",
     "estimates_at_end",  # of a program over files
     "processor_s", "memory_growth_bytes",  # of a system in a process of its own
 )  # fmt: skip

@@ -6,7 +6,9 @@ stands still tells where the robot is, whatever any SLAM makes of it. ``create("
 
 A likelihood field (Thrun, Burgard, Fox 2005, section 6.4): the distance of each end point from the
 nearest wall, least squares with a kernel that lets go of what is far from all walls (Geman and
-McClure 1987), from odometry's prior.
+McClure 1987), from odometry's prior. A pose at which beams pass through walls is wrong, whoever
+stands around: then it looks for one where they do not, first nearby (a robot that was turned by a
+push), then everywhere (one that was carried).
 """
 
 from __future__ import annotations
@@ -17,6 +19,7 @@ import numpy as np
 from scipy.ndimage import distance_transform_edt
 
 from slam import se2
+from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate, Raster
 from slam.frames import Float, Frame, Odometry
@@ -31,6 +34,13 @@ FLOOR_M, FLOOR_RAD = 0.01, math.radians(0.3)  # least spread of odometry's prior
 MOST_M = 1e3  # from the nearest wall, where there is none
 ENOUGH = 20  # beams on walls; with fewer the pose is odometry's
 ASSUMED = (0.05, 0.05, math.radians(3.0))  # spread of a step whose odometry states none, m, m, rad
+DENIED = 0.1  # of the beams through walls, from which on a pose is wrong; at true ones 0.06 at most
+AGAINST = 4.0  # points on walls that a beam through a wall outweighs
+THROUGH_M = 0.2  # before its end, within which a beam may touch a wall
+APART_M, APART_RAD = 0.2, math.radians(4.0)  # of the poses that a search tries
+NEAR_M = 0.4  # from odometry's guess, to look first
+BEAMS, BEST = 45, 20  # that a search looks at; poses of which it refines and compares
+FOUND = (0.1, 0.1, math.radians(3.0))  # spread of a pose that a search proposes, m, m, rad
 
 
 class MapOracle:
@@ -80,7 +90,10 @@ class MapOracle:
             spec.beam_time_offsets[valid], spec.T_robot_laser,
             np.zeros(3) if twist is None else np.asarray(twist),
         )  # fmt: skip
-        self._T_map_robot, self._spread, walls = self._matched(pose, spread, points)
+        matched = self._matched(pose, spread, points)
+        if self._denied(matched[0], points) > DENIED:
+            matched = self._searched(pose, points) or matched
+        self._T_map_robot, self._spread, walls = matched
         self._before = frame.odometry
         self._path.add(frame.stamp_ns, self._T_map_robot)
         return Estimate(
@@ -126,6 +139,60 @@ class MapOracle:
         found = np.linalg.inv(told + sure)
         return pose, 0.5 * (found + found.T), walls
 
+    def _searched(self, prior: Float, points: Float) -> tuple[Float, Float, int] | None:
+        """The pose that walls speak for the most, and hardly a beam against; None of none."""
+        assert self._field is not None
+        field, cell_m, T_field_map = self._field
+        some = points[:: max(1, len(points) // BEAMS)]
+        near = np.arange(-NEAR_M, NEAR_M + 1e-9, 0.5 * APART_M)
+        around = prior[:2] + np.stack(np.meshgrid(near, near), axis=2).reshape(-1, 2)
+        every = round(APART_M / cell_m)
+        rows, columns = np.nonzero(field[::every, ::every] > APART_M)
+        cells = cell_m * every * np.stack([columns, rows], axis=1).astype(np.float64)
+        everywhere = se2.transform(se2.inverse(T_field_map), cells)
+        for places, least in ((around, ENOUGH), (everywhere, len(points) / 2)):
+            best, most = None, max(float(ENOUGH), least)
+            for pose in self._likely(places, some):
+                found = self._matched(pose, np.diag(np.square(FOUND)), points)
+                through = self._denied(found[0], points)
+                told = found[2] - AGAINST * through * len(points)
+                if through <= 0.5 * DENIED and told > most:
+                    best, most = found, told
+            if best is not None:
+                return best
+        return None
+
+    def _likely(self, places: Float, points: Float) -> Float:
+        """(``BEST``, 3) poses, each of another heading, with the most points near walls."""
+        assert self._field is not None
+        field, cell_m, T_field_map = self._field
+        at = se2.transform(T_field_map, places) / cell_m
+        headings = np.arange(-math.pi, math.pi, APART_RAD)
+        where, counts = np.empty(len(headings), dtype=np.int64), np.empty(len(headings))
+        for k, heading in enumerate((headings + T_field_map[2]).tolist()):
+            turned = se2.transform(np.array([0.0, 0.0, heading]), points) / cell_m
+            where[k], counts[k] = _nearest_walls(field, at, turned)
+        first = np.argsort(-counts, kind="stable")[:BEST]
+        return np.column_stack([places[where[first]], headings[first]])
+
+    def _metres(self, points_map: Float) -> Float:
+        """(n,) m from each point to the nearest wall, negative within one; far outside the map."""
+        assert self._field is not None
+        field, cell_m, T_field_map = self._field
+        column, row = np.rint(se2.transform(T_field_map, points_map) / cell_m).astype(np.int64).T
+        known = (column >= 0) & (row >= 0) & (column < field.shape[1]) & (row < field.shape[0])
+        return np.where(known, field[np.where(known, row, 0), np.where(known, column, 0)], MOST_M)
+
+    def _denied(self, pose: Float, points: Float) -> float:
+        """The share of points that lie behind a wall, seen from the robot."""
+        far = np.sqrt((points * points).sum(axis=1))
+        steps = np.arange(0.0, float(far.max(initial=0.0)), 0.05)[None, :]
+        shares = steps / np.maximum(far, 1e-9)[:, None]
+        along = (shares[:, :, None] * points[:, None, :]).reshape(-1, 2)
+        inside = (self._metres(se2.transform(pose, along)) < 0.0).reshape(shares.shape)
+        through = (inside & (steps < far[:, None] - THROUGH_M)).sum(axis=1) > 1
+        return float(through.mean()) if len(points) >= ENOUGH else 0.0
+
     def _normal(self, pose: Float, points: Float, kernel_m: float) -> tuple[Float, Float, int]:
         """Normal equations (3, 3) and (3,) of the distances to walls, and how many are near."""
         assert self._field is not None
@@ -152,3 +219,19 @@ class MapOracle:
         told = np.array([[(weight * p * q).sum() for q in lines] for p in lines])
         pull = -np.array([(weight * p * far).sum() for p in lines])
         return told, pull, int((np.abs(far) < kernel_m).sum())
+
+
+@njit
+def _nearest_walls(field: Float, places: Float, points: Float) -> tuple[int, int]:
+    """Of (n, 2) cells the one from which most of (k, 2) points are near walls, and how many are."""
+    best, most = 0, -1
+    for k in range(len(places)):
+        count = 0
+        for i in range(len(points)):
+            column = round(places[k, 0] + points[i, 0])
+            row = round(places[k, 1] + points[i, 1])
+            if 0 <= column < field.shape[1] and 0 <= row < field.shape[0]:
+                count += abs(field[row, column]) < APART_M
+        if count > most:
+            best, most = k, count
+    return best, most

@@ -13,27 +13,22 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.answers import (
-    as_map,
     asked,
     asked_at_end,
     asked_changes,
     asked_landmarks,
     asked_map,
     asked_trajectory,
-    judged,
 )
 from slam.constant_velocity import ConstantVelocity
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame, Stream
 from slam.oracle import shown
-from slam.strips import MapStrips, of_layers, of_parts, of_raster
 from slam.system import (
     CanSave,
-    ChangesInParts,
     HasChanges,
     HasLandmarks,
-    MapsInParts,
     RunsAtTheEnd,
     SaysCells,
     SlamSystem,
@@ -118,47 +113,6 @@ class Track:
         """The map now; raises ``SlamFailedError`` for what no map can be."""
         with self._named("map()"):
             return asked_map(self.system)
-
-    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
-        """The map within ``bounds`` of a system that ``MapsInParts``; raises as ``map`` does."""
-        system = self.system
-        if not isinstance(system, MapsInParts):
-            return self.map()
-        with self._named("map_part()"), judged():
-            return as_map(system.map_part(bounds))
-
-    def map_strips(self) -> MapStrips | None:
-        """The map now, a strip at a time where the system ``MapsInParts``; raises as ``map``."""
-        system = self.system
-        if not isinstance(system, MapsInParts):
-            raster = self.map()
-            return None if raster is None else of_raster(raster)
-        with self._named("map_squares()"), judged():
-            squares = system.map_squares()
-        return of_parts(self.map_part, squares)
-
-    def changes_strips(self) -> tuple[MapStrips, MapStrips] | None:
-        """What appeared and what is gone lately, so; raises as ``changes``."""
-        system = self.system
-        if not isinstance(system, MapsInParts) or not isinstance(system, ChangesInParts):
-            known = self.changes()
-            return None if known is None else (of_raster(known.appeared), of_raster(known.gone))
-        with self._named("map_squares()"), judged():
-            squares = system.map_squares()
-        layers = of_layers(self._layers, 2, squares)
-        return None if layers is None else (layers[0], layers[1])
-
-    def changes_part(self, bounds: tuple[float, float, float, float]) -> Changes | None:
-        """The changes within ``bounds`` of a system that has ``ChangesInParts``."""
-        system = self.system
-        if not isinstance(system, ChangesInParts):
-            return self.changes()
-        with self._named("changes_part()"), judged():
-            return system.changes_part(bounds)
-
-    def _layers(self, bounds: tuple[float, float, float, float]) -> Sequence[Raster | None]:
-        part = self.changes_part(bounds)
-        return (None, None) if part is None else (part.appeared, part.gone)
 
     def landmarks(self) -> Landmarks | None:
         """Its landmarks, None for a system without; raises ``SlamFailedError`` as ``map`` does."""

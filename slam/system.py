@@ -7,8 +7,8 @@
         def map(self) -> Raster | None: ...
         def trajectory(self) -> Trajectory: ...
 
-A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave``, ``MapsInParts``,
-``SaysCells`` and ``RunsAtTheEnd`` are optional.
+A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave``, ``SaysCells`` and
+``RunsAtTheEnd`` are optional.
 Who wants one of these asks whether it is there (``slam.replay.Track``), never for a class.
 
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
@@ -33,7 +33,7 @@ from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
-from slam.estimate import Changes, Estimate, Landmarks, MapSquares, Raster
+from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame
 from slam.names import first_line, join_folders, refuse_code
 from slam.settings import Settings
@@ -41,8 +41,7 @@ from slam.trajectory import Trajectory
 from slam.variants import MAP_ORACLE, inside, oracle_of, parsed
 
 __all__ = [
-    "CanSave", "Changes", "ChangesInParts", "Estimate", "HasChanges", "HasLandmarks", "Landmarks",
-    "MapSquares", "MapsInParts", "Raster",
+    "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "Raster",
     "RunsAtTheEnd", "SaysCells", "SlamSystem", "config_of", "create", "describe", "names",
     "refuse_at_the_end", "register", "register_prefix", "told",
 ]  # fmt: skip
@@ -91,28 +90,6 @@ class CanSave(Protocol):
 
     def save(self, path: Path) -> None:
         """Write the map; raises ``OutputError``."""
-
-
-@runtime_checkable
-class MapsInParts(Protocol):
-    """Optional: a map that can be had in part. The film of a long log draws what has changed, and
-    files and pictures of a large map are made without holding it as one raster."""
-
-    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
-        """The cells of ``map()`` within xmin, ymin, xmax, ymax, m in the map frame, and their
-        neighbours up to one cell, NaN where nothing is; None where nothing can be.
-        """
-
-    def map_squares(self) -> MapSquares:
-        """Where ``map()`` has cells; none of them for an empty map."""
-
-
-@runtime_checkable
-class ChangesInParts(Protocol):
-    """Optional, beside ``MapsInParts``: changes that can be had in part."""
-
-    def changes_part(self, bounds: tuple[float, float, float, float]) -> Changes | None:
-        """The cells of ``changes()`` within ``bounds``, as ``map_part`` those of ``map()``."""
 
 
 @runtime_checkable

@@ -16,7 +16,7 @@ from typing import Any
 import mujoco
 import numpy as np
 
-from scripts import workers
+from scripts import marks, workers
 from scripts.benches.world import DYNAMISM, SEED, note_poses, timed
 from sim.sensors.lidar.candidates import UNSEEN_GROUPS
 from sim.sensors.lidar.device import LaserScanner
@@ -153,14 +153,12 @@ def _digits(figure: float) -> str:
 
 def table(found: list[Row], machine: dict[str, Any]) -> str:
     """As a table of Markdown, with the machine and how busy it is."""
-    lines = [
-        "| against | unit | mobilia | peer | peer / mobilia (96 %) |",
-        "|---|---|---|---|---|",
-        *(
-            f"| {row['what']} | {row['unit']} | {_digits(row['ours'])} | {_digits(row['peer'])} "
-            f"| {_digits(row['ratio'])} ({_digits(row['low'])}–{_digits(row['high'])}) |"
-            for row in found
-        ),
-    ]
+    rows = [
+        [row["what"], row["unit"], _digits(row["ours"]), _digits(row["peer"]),
+         f"{_digits(row['ratio'])} ({_digits(row['low'])}–{_digits(row['high'])})"]
+        for row in found
+    ]  # fmt: skip
+    heads = ("against", "unit", "mobilia", "peer", "peer / mobilia (96 %)")
     where = f"{machine['processor']} with {machine['cores']} cores at load {os.getloadavg()[0]:.0f}"
-    return "\n".join([*lines, "", f"Made by `mobilia bench --against --page` on an {where}."])
+    made = f"Made by `mobilia bench --against --page` on an {where}."
+    return f"{marks.table(heads, rows, left=2)}\n\n{made}"

@@ -15,6 +15,7 @@ from scripts.benchmark.scores import COLUMNS, RANKED, SILENT, TRACKING, Row, ran
 from scripts.benchmark.tracks import LEVELS, Track
 from scripts.comparison.csv_files import write_csv
 from scripts.comparison.schema import FAILED
+from scripts.marks import table
 from scripts.metrics.row import digits
 from scripts.report.answer import ODOMETRY, against, answer, standing
 from scripts.report.study import LEAST_RUNS
@@ -246,7 +247,7 @@ class Board:
         parts = ["# Leaderboard", *self.said(), *self._notes()]
         if self.ranking:
             parts += [f"## On the same {self.ranking[0]['runs']} runs", _RANKED]
-            parts.append(markdown_table(RANKED_HEADS, self.ranked(), left=2))
+            parts.append(table(RANKED_HEADS, self.ranked(), left=2))
         parts += ["## Lost from which level", _LOST]
         heads = ["track", "counts", *self.slams]
         lines = [
@@ -254,7 +255,7 @@ class Board:
              *(lost_from_words(self.row(t.name, slam)) for slam in self.slams)]
             for t in self.tracks
         ]  # fmt: skip
-        parts.append(markdown_table(heads, lines, left=1))
+        parts.append(table(heads, lines))
         for track in self.tracks:
             parts += self._section(track)
         parts += [self.days_page] if self.days_page else []
@@ -262,15 +263,15 @@ class Board:
 
     def ranked(self) -> list[list[str]]:
         """The table of ``ranking`` in words: controls have no place."""
-        table, place = list[list[str]](), 0
+        lines, place = list[list[str]](), 0
         for row in self.ranking:
             control = self.is_control(row["slam"])
             place += not control
-            table.append([
+            lines.append([
                 "–" if control else str(place), row["slam"], _from(row | {"seeds": LEAST_RUNS}),
                 f"{row['lost_runs']} of {row['runs']}", _number(TRACKING, CM)(row),
             ])  # fmt: skip
-        return table
+        return lines
 
     def _notes(self) -> list[str]:
         lines = [f"- {key}: {value}" for key, value in self.head.items() if key in _SHOWN]
@@ -311,7 +312,7 @@ class Board:
         return [
             f"## {track.name}",
             " ".join(sentences),
-            markdown_table(["SLAM", *(name for name, _ in _CELLS)], lines, left=1),
+            table(["SLAM", *(name for name, _ in _CELLS)], lines),
         ]
 
 
@@ -338,7 +339,7 @@ _LOST = (
     "The level from which half of the runs are lost, with its 95 % interval (bootstrap over the "
     "seeds, isotonic regression); levels go from 0 to 1. It is `never` where the whole interval is "
     f"above 1, and has no interval with fewer than {LEAST_RUNS} seeds. A track "
-    "counts where an oracle is never lost, and at most 2 cm off."
+    "counts where an oracle is lost in at most a tenth of its runs, and at most 5 cm off."
 )
 
 
@@ -385,11 +386,3 @@ _CELLS: tuple[tuple[str, Callable[[Row], str]], ...] = (
 def lost_from_words(row: Row | None) -> str:
     """A cell of the first table: "0.43 [0.31, 0.6]", "> 1 [0.9, > 1]", "never", or a dash."""
     return "–" if row is None else _from(row)
-
-
-def markdown_table(heads: Sequence[str], lines: Sequence[Sequence[str]], *, left: int) -> str:
-    """A table whose first ``left`` columns are words."""
-    rule = [*["---"] * left, *["---:"] * (len(heads) - left)]
-    rows = ("| " + " | ".join(word.replace("|", "/") for word in row) + " |"
-            for row in (heads, rule, *lines))  # fmt: skip
-    return "\n".join(rows)

@@ -13,15 +13,16 @@ from pathlib import Path
 from typing import Any
 
 from scripts import workers
-from scripts.benchmark.board import markdown_table
 from scripts.benchmark.tracks import TEST, TRAIN
 from scripts.comparison.csv_files import write_csv
+from scripts.console import ended
 from scripts.days import buildings as lives
 from scripts.days import scores
 from scripts.days.buildings import Buildings
 from scripts.days.scores import Row
 from scripts.jobs import try_names
 from scripts.machine import machine, versions
+from scripts.marks import table
 from scripts.options import whole
 from scripts.output import result_folder
 from scripts.report import score_tables
@@ -30,7 +31,7 @@ from scripts.result_files import SCHEMA, load
 from scripts.result_files import write as write_results
 from sim.core.versions import WORLD
 from sim.recording.recipe import Recipe
-from slam.errors import LogFormatError, MobiliaError
+from slam.errors import LogFormatError
 
 COMMAND = "days"
 NAMES = ("days.csv", "days.json")
@@ -110,7 +111,7 @@ def section(rows: Sequence[Row], *, tables: bool = True) -> str:
             [heading, *(score_tables.both(*cell) for cell in cells)]
             for heading, cells in score_tables.table(own)
         ]
-        parts.append(markdown_table(heads, lines, left=1))
+        parts.append(table(heads, lines))
     return "\n\n".join(parts)
 
 
@@ -146,7 +147,8 @@ def carry_out(
     return rows
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@ended
+def main(arguments: Sequence[str] | None = None) -> None:
     """Make it, and print it as Markdown."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("out", type=Path)
@@ -157,19 +159,12 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--quick", action="store_true")
     parser.add_argument("--jobs", type=int, default=1)
     wanted = parser.parse_args(arguments)
-    try:
-        workers.check_jobs(wanted.jobs)
-        known = TRAIN if wanted.train else TEST
-        count = (QUICK_SEEDS if wanted.quick else SEEDS) if wanted.seeds is None else wanted.seeds
-        whole("--seeds", count, 1, len(known))
-        seeds = known[:count]
-        of = buildings(wanted.slam, seeds, quick=wanted.quick, seconds=wanted.seconds)
-        rows = carry_out(of, wanted.out, jobs=wanted.jobs)
-    except (MobiliaError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    print(section(rows))
-    return 0
+    workers.check_jobs(wanted.jobs)
+    known = TRAIN if wanted.train else TEST
+    count = (QUICK_SEEDS if wanted.quick else SEEDS) if wanted.seeds is None else wanted.seeds
+    whole("--seeds", count, 1, len(known))
+    of = buildings(wanted.slam, known[:count], quick=wanted.quick, seconds=wanted.seconds)
+    print(section(carry_out(of, wanted.out, jobs=wanted.jobs)))
 
 
 if __name__ == "__main__":

@@ -29,7 +29,6 @@ from slam.errors import InvalidValueError, MissingDependencyError
 
 COMMAND = "benchmark"
 SEEDS, QUICK_SEEDS = 6, 1
-_ALIKE = ("seeds", "levels", "seconds")
 Digests = dict[str, dict[tuple[float, int], str]]  # of recordings, by track, level and seed
 Runs = dict[str, list[dict[str, Any]]]  # rows of runs.csv by track
 
@@ -247,15 +246,22 @@ def _poses(compared: Compared, row: Mapping[str, Any], slam: str) -> str:
 
 def _check_alike(merge: Sequence[Submission], wanted: Wanted, taken: set[str]) -> None:
     """``InvalidValueError`` for one that did not run what is to be run here, or is called alike."""
-    head = wanted.head()
-    ours = (head["seeds_of"], tuple(head["seeds"]), wanted.levels, wanted.seconds)
+    head, of = wanted.head(), {track.name: wanted.seeds_of(track) for track in wanted.tracks}
     for one in merge:
-        if not set(one.runs) & set(head["tracks_run"]):
+        shared = [track for track in one.runs if track in of]
+        if not shared:
             raise InvalidValueError(
                 f"submission {one.name!r}: the board has none of its tracks: {', '.join(one.runs)}"
             )
-        theirs = (one.seeds_of, one.seeds, one.levels, one.seconds)
-        for what, a, b in zip(("kind of seeds", *_ALIKE), theirs, ours, strict=True):
+        pairs = [
+            ("kind of seeds", one.seeds_of, head["seeds_of"]),
+            ("levels", one.levels, wanted.levels), ("seconds", one.seconds, wanted.seconds),
+        ]  # fmt: skip
+        for track in shared:
+            ran = {run["seed"] for run in one.runs[track]}
+            theirs = tuple(seed for seed in one.seeds if seed in ran)
+            pairs.append((f"seeds of {track}", theirs, of[track][: wanted.seeds]))
+        for what, a, b in pairs:
             if a != b:
                 raise InvalidValueError(
                     f"submission {one.name!r}: its {what} must be those of the board, {b}, got {a}"

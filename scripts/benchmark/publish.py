@@ -16,14 +16,14 @@ from pathlib import Path
 from typing import Any
 
 from scripts.benchmark import days, picture, published
-from scripts.benchmark.board import RANKED_HEADS, Board, markdown_table
+from scripts.benchmark.board import RANKED_HEADS, Board
 from scripts.benchmark.published import Published, Row
 from scripts.benchmark.tracks import LEVELS, Track, newest
 from scripts.comparison.csv_files import write_csv
+from scripts.console import ended
 from scripts.days.scores import LEVEL_COLUMNS, levels
-from scripts.marks import fill_page
+from scripts.marks import fill_page, table
 from scripts.result_files import RESULTS, ROOT
-from slam.errors import MobiliaError
 from slam.files import write_text
 
 DOCS = ROOT / "docs"
@@ -38,13 +38,13 @@ def tracks_of(of: Published) -> list[Track]:
 
 def tracks_table(tracks: Sequence[Track]) -> str:
     """A row for each."""
-    table = []
+    rows = []
     for track in tracks:
         says = f"{track.axis}: {', '.join(word.split(' ', 1)[0] for word in track.says)}"
         words = [f"`{track.name}`", track.about, says, track.scene, f"{track.seconds:g}"]
-        table.append([*words, _COUNTS[track.counts]])
+        rows.append([*words, _COUNTS[track.counts]])
     heads = ("track", "what happens", f"level {_list(LEVELS)}", "scene", "s", "counts")
-    return markdown_table(heads, table, left=4)
+    return table(heads, rows, left=4)
 
 
 def board_of(of: Published) -> Board:
@@ -61,7 +61,7 @@ def shipped(of: Published) -> str:
     board = board_of(of)
     made, on = of.made_with, of.made_with["machine"]["processor"]
     return (
-        f"{markdown_table(RANKED_HEADS, board.ranked(), left=2)}\n\n{_ranked_runs(board)}; "
+        f"{table(RANKED_HEADS, board.ranked(), left=2)}\n\n{_ranked_runs(board)}; "
         f"commit {made['commit']}, {on}, MuJoCo {made['versions']['mujoco']}."
     )
 
@@ -81,7 +81,7 @@ def at_the_top(of: Published) -> str:
         [track.name, _COUNTS[track.counts], *(_lost(rows[track.name], s) for s in slams)]
         for track in board.tracks
     ]
-    return markdown_table(["track", "counts", *slams], lines, left=2)
+    return table(["track", "counts", *slams], lines, left=2)
 
 
 def _lost(rows: Sequence[Row], slam: str) -> str:
@@ -141,7 +141,8 @@ def _publish_days(page: Path, results: Path) -> None:
     write_text(page, f"{before.rstrip()}\n\n{days.section(rows, tables=False)}\n\n{_DAYS}\n")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@ended
+def main(arguments: Sequence[str] | None = None) -> None:
     """Publish."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("days", type=Path, nargs="?", help="a folder of benchmark.days")
@@ -149,12 +150,7 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--results", type=Path, default=RESULTS)
     parser.add_argument("--commit", default="", help="of the code that ran the days")
     wanted = parser.parse_args(arguments)
-    try:
-        publish(wanted.docs, wanted.results, wanted.days, wanted.commit)
-    except (MobiliaError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
-    return 0
+    publish(wanted.docs, wanted.results, wanted.days, wanted.commit)
 
 
 if __name__ == "__main__":

@@ -20,6 +20,7 @@ from typing import Any
 
 from scripts.benchmark.submission import RUN, SHA256
 from scripts.benchmark.tracks import (
+    FRESH,
     LEVELS,
     QUICK_LEVELS,
     TRACKS,
@@ -32,12 +33,12 @@ from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
 from scripts.comparison.rules import MAX_DEPTH, Rule, check_keys, is_shallow, number
-from scripts.console import note
+from scripts.console import ended, note
 from scripts.machine import machine, versions
 from scripts.report.answer import ODOMETRY
 from scripts.result_files import finite, load, write
 from sim.core.versions import WORLD, world_of
-from slam.errors import InvalidValueError, LogFormatError, MobiliaError
+from slam.errors import InvalidValueError, LogFormatError
 
 FILE = Path(__file__).with_name("published.json")
 SCHEMA, WHAT = 1, "published runs of the benchmark of mobilia"
@@ -187,7 +188,8 @@ _RUN: Mapping[str, Rule] = {
 }
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@ended
+def main(arguments: Sequence[str] | None = None) -> None:
     """Run what is to be published, or write the file."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark, or --run")
@@ -198,23 +200,20 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--levels", type=float, nargs="+", default=list(LEVELS))
     parser.add_argument("--first", type=int, default=0, help="of the test seeds")
     parser.add_argument("--seeds", type=int, default=1)
+    parser.add_argument("--fresh", action="store_true", help=f"seeds from {FRESH[0]} on, instead")
     wanted = parser.parse_args(arguments)
-    try:
-        if wanted.run:
-            for track in chosen(wanted.tracks):
-                seeds = track.test[wanted.first : wanted.first + wanted.seeds]
-                plan = track.plan(wanted.run, seeds, levels=tuple(wanted.levels))
-                note(f"{track.name}: {track.about}")
-                compare(plan, wanted.folders[0] / track.name)
-            return 0
-        if not wanted.commit:
-            raise InvalidValueError("--commit must say of which code the runs are")
-        made = write_from(wanted.folders, wanted.out, wanted.commit)
-    except (MobiliaError, OSError) as error:
-        print(error, file=sys.stderr)
-        return 1
+    if wanted.run:
+        for track in chosen(wanted.tracks):
+            of = FRESH if wanted.fresh else track.test
+            seeds = of[wanted.first : wanted.first + wanted.seeds]
+            plan = track.plan(wanted.run, seeds, levels=tuple(wanted.levels))
+            note(f"{track.name}: {track.about}")
+            compare(plan, wanted.folders[0] / track.name)
+        return
+    if not wanted.commit:
+        raise InvalidValueError("--commit must say of which code the runs are")
+    made = write_from(wanted.folders, wanted.out, wanted.commit)
     print(f"{wanted.out}: {sum(map(len, made.runs.values()))} recordings")
-    return 0
 
 
 if __name__ == "__main__":

@@ -10,7 +10,7 @@ from typing import NamedTuple
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.marks import with_tables_apart
+from scripts.marks import table, with_tables_apart
 from sim.sensors.lidar.registry import DEFAULT, describe
 from sim.sensors.lidar.sheet import NOT_STATED
 from slam.files import make_folder, write_text
@@ -36,17 +36,15 @@ class Row(NamedTuple):
 
 def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
     """The lines of a table."""
-    rule = "|" + "---|" * len(headings)
-    head, *lines = ("| " + " | ".join(row) + " |" for row in (headings, *rows))
-    return [head.replace("|  |", "| |"), rule, *lines]
+    return table(headings, rows, left=len(headings)).splitlines()
 
 
 def printed(title: str, headings: Sequence[str], rows: Sequence[Sequence[str]]) -> Table:
     """The same table for a console."""
-    table = Table(*map(escape, headings), title=escape(title), title_justify="left")
+    found = Table(*map(escape, headings), title=escape(title), title_justify="left")
     for row in rows:
-        table.add_row(*(STYLES.get(cell, escape(cell)) for cell in row))
-    return table
+        found.add_row(*(STYLES.get(cell, escape(cell)) for cell in row))
+    return found
 
 
 def write(out: Path, name: str, lines: Sequence[str]) -> Path:

@@ -11,7 +11,7 @@ from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 from PIL import Image
 
-from scripts.card.bench import Bench, box, only, post
+from scripts.card.rows import Bench, box, only, post
 from scripts.figures import save, styled
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam.frames import Float

@@ -1,35 +1,106 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A run of a comparison as what would make it again: for films and counterfactuals."""
+"""A run on file as what would make it again: for films and counterfactuals."""
 
 from __future__ import annotations
 
+from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
 from scripts.comparison.plan import Plan
-from scripts.names import RUNS
+from scripts.names import RUNS, is_run
+from scripts.options import admitted
 from scripts.output import RECIPE, check_whole, read_recipe_words, scenes_of, slams_of
 from sim.core.versions import check_world, world_of
-from sim.recording.recipe import Recipe
+from sim.recording.recipe import Made, Recipe, read_recipe
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+
+OF_ONE = ("run", "demo", None)  # commands that leave one run
+OF_THE_RUN = ("slams", "seconds", "simulation")  # in the recipe of a run; the rest is the world's
 
 
 @dataclass(frozen=True, kw_only=True)
 class Again:
-    """The simulation, of which every SLAM gets one scan in ``every``; its names are of a file."""
+    """What makes a run again.
 
-    recipe: Recipe
-    every: int
-    slams: tuple[str, ...]
-
-
-def run_of(path: Path) -> Again:
-    """Of such a file.
-
-    Raises ``LogFormatError`` that says what is wrong with it or its comparison's recipe,
-    ``WorldVersionError`` for one of another version of the world.
+    settings  arguments of ``Simulation``, but for its labels
+    seconds   of the tour
+    slams     that ran, by names of a file;   every  they got one scan in so many
+    twin      of an episode: which version of its drive it is;   made  who recorded it
     """
+
+    settings: Mapping[str, Any]
+    seconds: float
+    slams: tuple[str, ...] = ()
+    every: int = 1
+    twin: str = ""
+    made: Made | None = None
+
+    @property
+    def slam(self) -> str:
+        """The one that the run was about; "" where nobody says."""
+        return next((name for name in self.slams if name != "odometry"), "")
+
+
+def again(path: Path, trust: bool = False) -> Again:
+    """Of the folder of a run or an episode, or of a run of a comparison.
+
+    trust  whether a scene that is code, by the name that a file there has, is run; the names of its
+           SLAMs stay those of a file
+
+    Raises ``LogFormatError`` that says what is missing or wrong there, ``UntrustedNameError``
+    without ``trust``, ``WorldVersionError`` for a run of another version of the world.
+    """
+    if is_run(path):
+        return run_of(path, trust)
+    recipe = path / RECIPE if path.is_dir() else path
+    words = read_recipe_words(recipe)
+    if "recipe" in words:
+        made = read_recipe(recipe)
+        check_world(recipe, made.world)
+        return _of(made.recipe, trust, twin=made.recipe.twin, made=made)
+    command, settings = words.get("command"), words.get("settings")
+    if command not in OF_ONE:
+        raise LogFormatError(recipe.parent, why_no_run(recipe.parent, command))
+    if not isinstance(settings, dict):
+        raise LogFormatError(recipe, "no recipe of a run: it has no settings")
+    slams = tuple(slams_of(recipe, settings))
+    if "log" in settings:
+        named = [name for name in slams if name != "odometry"][:1]
+        film = " ".join(
+            [f"render '{settings['log']}' itself", *(f"with --slam {n}" for n in named)]
+        )
+        why = f"this run was on a log, which is not kept in it: for a film, {film}"
+        raise LogFormatError(recipe.parent, why)
+    if "scene" not in settings or "seconds" not in settings:
+        raise LogFormatError(recipe.parent, why_no_run(recipe.parent, command))
+    _check_settings(recipe, settings)
+    check_world(recipe, world_of(recipe, words))
+    world = {key: value for key, value in settings.items() if key not in OF_THE_RUN}
+    world["scene"] = admitted(scenes_of(recipe, {"scene": settings["scene"]})[0], "scene", trust)
+    return Again(settings=world, seconds=settings["seconds"], slams=slams)
+
+
+def _of(recipe: Recipe, trust: bool, **more: Any) -> Again:
+    settings = {key: value for key, value in recipe.simulation().items() if key != "labels"}
+    settings["scene"] = admitted(recipe.scene, "scene", trust)
+    return Again(settings=settings, seconds=recipe.seconds, **more)
+
+
+def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
+    unknown = sorted({"drive", "name", "start"}.intersection(settings))
+    if unknown:
+        raise LogFormatError(path, f"no recipe of a run: settings.{unknown[0]} is none of them")
+    if not isinstance(settings.get("laser", ""), str):
+        raise LogFormatError(path, "no recipe of a run: settings.laser must be a scanner's name")
+    seconds = settings["seconds"]
+    if isinstance(seconds, bool) or not isinstance(seconds, int | float):
+        raise LogFormatError(path, f"no recipe of a run: seconds must be a number, got {seconds!r}")
+
+
+def run_of(path: Path, trust: bool = False) -> Again:
+    """Of ``DIR/runs/NAME.npz`` of a comparison; raises as ``again``."""
     check_whole(path.parent.parent)
     recipe = path.parent.parent / RECIPE
     words = read_recipe_words(recipe)
@@ -53,7 +124,7 @@ def run_of(path: Path) -> Again:
         raise LogFormatError(recipe, f"no recipe of a comparison: {error}") from error
     for run in plan.runs():
         if run.name == path.stem:
-            return Again(recipe=plan.recipe(run), every=plan.every, slams=plan.slams)
+            return _of(plan.recipe(run), trust, slams=plan.slams, every=plan.every)
     raise LogFormatError(path, f"no run of that comparison, whose first is {plan.runs()[0].name}")
 
 

@@ -25,9 +25,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.kinds import is_door
-from scripts.comparison.places import BELIEVED, LATELY_S, OldPlace, Places
 from scripts.comparison.recording import Recording
-from scripts.comparison.sight import Sight, clearance
+from scripts.comparison.sight import BELIEVED, LATELY_S, OldPlace, Places, Sight, clearance
 from slam import se2
 from slam.evaluation.statistics import censored_median
 from slam.frames import NS_PER_S, Float

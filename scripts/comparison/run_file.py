@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from scripts.comparison.arrays import MOST_CELLS, Array, check_shapes
+from scripts.comparison.rules import MOST_CELLS, Array, check_shapes
 from scripts.comparison.schema import ENTRY, ENTRY_MAP, RUN, SCHEMA
 from sim.recording.sums import check_vouched
 from slam.archives import Header, read_arrays, read_headers

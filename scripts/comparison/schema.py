@@ -11,13 +11,13 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping
 
-from scripts.comparison.arrays import Array
 from scripts.comparison.rules import (
     LEVEL,
     MAX_MESSAGE,
     PLAIN,
     SHARE,
     TRUTH,
+    Array,
     Columns,
     Rule,
     Table,
@@ -169,7 +169,7 @@ RUN: Mapping[str, Array] = {
     "T_world_origin": _POSE,
     "laser_angle_min": Array(kinds="f", least=-100.0, most=100.0),
     "laser_angle_increment": Array(kinds="f", least=-100.0, most=100.0),
-    "laser_range_max": Array(kinds="f", most=MOST_M),
+    "laser_range_max": Array(kinds="fi", most=MOST_M),  # whole where a scanner's name has it whole
     "laser_T_robot_laser": _POSE,
 }
 """The arrays of a file of ``runs/``; what is called alike has the same length."""

@@ -1,15 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the scans of a recording saw, from the true pose: where they hit, which places they saw
-empty, through which doorways they looked. The same for every SLAM."""
+empty, through which doorways they looked. Where movers stand and stood: new objects that a map
+should hold, old places that it should forget. The same for every SLAM."""
 
 from __future__ import annotations
 
 import math
+from collections.abc import Callable, Iterator
+from dataclasses import dataclass, field
 
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.kinds import is_door
+from scenes.kinds import KINDS, is_door
 from scripts.comparison.recording import Recording
 from slam import se2
 from slam.frames import Float, Scan
@@ -111,3 +114,136 @@ def clearance(points: Float, drive: Recording, k: int, *, without: int = -1) -> 
         distance = np.sqrt((offset * offset).sum(axis=1)) - reach
         nearest = np.minimum(nearest, distance)
     return nearest
+
+
+MOVED_M = 0.15  # shift of the centre plus turn at the rim that makes it another place
+STILL_S, SEEN_SCANS, LATELY_S = 2.0, 5, 2.0
+APART_M = 0.2  # points nearer to a wall than this tell nothing about a mover
+GRAIN_M = 0.02  # hits nearer to one another are one point
+BELIEVED = 0.5
+
+
+def _group(kind: str) -> str:
+    """What moves a kind; one that a module registers, and this process does not know, is itself."""
+    return KINDS[kind].group if kind in KINDS else kind
+
+
+@dataclass(eq=False)
+class Place:
+    """Where a mover stands: since scan ``first``, hit at ``cells`` (units of ``GRAIN_M``)."""
+
+    pose: Float
+    first: int
+    new: bool
+    cells: set[tuple[int, int]] = field(default_factory=set)
+    scans: int = 0
+    last: int = -1
+
+    def points(self) -> Float:
+        """(n, 2) m in the world."""
+        return (np.array(sorted(self.cells), dtype=np.float64).reshape(-1, 2) + 0.5) * GRAIN_M
+
+
+@dataclass(eq=False)
+class OldPlace:
+    """A place that its mover has left, and for how long a map's belief in it lasts.
+
+    believed      by the latest map, None before the first
+    seen_empty_s  when it was first seen empty, and ``observations`` in how many scans since
+    lasted_s      from then to the latest map asked
+    forgotten     that map no longer believed it: its end was seen
+    over          no longer watched: something stands there again, or it was not believed at first
+    """
+
+    points: Float
+    believed: bool | None = None
+    seen_empty_s: float | None = None
+    observations: int = 0
+    lasted_s: float = 0.0
+    forgotten: bool = False
+    over: bool = False
+
+    @property
+    def watched(self) -> bool:
+        """Whether maps still matter."""
+        return not self.over and not self.forgotten
+
+    @property
+    def fading(self) -> bool:
+        """Whether every map matters: it has been seen empty and is still believed."""
+        return self.watched and self.seen_empty_s is not None
+
+
+class Places:
+    """The places of all movers of a recording, scan by scan."""
+
+    def __init__(
+        self,
+        drive: Recording,
+        near_static: Callable[[Float], Float],
+        believes: Callable[[Float], bool | None],
+    ) -> None:
+        """A tally over one drive.
+
+        near_static  m from points (n, 2) in the world to the nearest thing that never moves
+        believes     whether the latest map holds such points; None before the first map
+        """
+        self._drive, self._near_static, self._believes = drive, near_static, believes
+        self._rows = [
+            k for k, kind in enumerate(drive.kinds) if _group(kind) not in ("door", "robot")
+        ]
+        self.standing = {row: Place(drive.poses[0, row], 0, new=False) for row in self._rows}
+        self.left: list[OldPlace] = []
+
+    def look(self, k: int, sight: Sight, seconds: float) -> None:
+        """Take in scan k."""
+        drive = self._drive
+        for row in self._rows:
+            pose, place = drive.poses[k, row], self.standing[row]
+            turned = abs(se2.wrap(float(pose[2] - place.pose[2]))) * float(drive.radii_m[row])
+            shift = math.dist(pose[:2].tolist(), place.pose[:2].tolist())
+            if shift + turned > MOVED_M:
+                self._leave(row, place)
+                place = self.standing[row] = Place(pose, k, new=True)
+            hits = sight.points[drive.hit[k] == row]
+            hits = hits[np.isfinite(hits[:, 0])]
+            hits = hits[self._near_static(hits) > APART_M]
+            if len(hits):
+                place.cells.update(map(tuple, np.floor(hits / GRAIN_M).astype(int).tolist()))
+                place.scans, place.last = place.scans + 1, k
+        for old in self.left:
+            if old.watched:
+                self._watch(old, k, sight, seconds)
+
+    def _leave(self, row: int, place: Place) -> None:
+        """People leave no place: they never stood there for good."""
+        if place.scans >= SEEN_SCANS and _group(self._drive.kinds[row]) != "person":
+            points = place.points()
+            self.left.append(OldPlace(points, believed=self._believes(points)))
+
+    def _watch(self, old: OldPlace, k: int, sight: Sight, seconds: float) -> None:
+        empty = sight.emptied(old.points).mean() >= 0.5
+        if old.believed is None or (old.seen_empty_s is None and not empty):
+            return
+        if (clearance(old.points, self._drive, k) < 0.5 * APART_M).any():
+            old.over = old.seen_empty_s is not None  # not gone yet, or taken again
+            return
+        if not empty:
+            return
+        if old.seen_empty_s is None:
+            if not old.believed:
+                old.over = True  # never was in the map: nothing to forget
+                return
+            old.seen_empty_s = seconds
+        old.observations += 1
+
+    def new_objects(self, k: int, scans_per_s: float) -> Iterator[Float]:
+        """Points of everything that stands at a new place long enough and was seen lately."""
+        for place in self.standing.values():
+            if (
+                place.new
+                and k - place.first >= STILL_S * scans_per_s
+                and place.scans >= SEEN_SCANS
+                and k - place.last <= LATELY_S * scans_per_s
+            ):
+                yield place.points()

@@ -19,25 +19,14 @@ from scripts.experiments.study import Study
 from slam.evaluation.lost import LOST_M
 
 DEG = 180.0 / math.pi
-BARE = {"crowd": "none", "walls": "none"}
+ARENA, BARE = {"scene": "arena", "dynamism": 0.5}, {"crowd": "none", "walls": "none"}
 DRIVES = {
-    "office 0": {"scene": "office", "dynamism": 0.0},
-    "office 0.5": {"scene": "office", "dynamism": 0.5},
-    "office 1": {"scene": "office", "dynamism": 1.0},
-    "arena, all move": {"scene": "arena", "dynamism": 0.5, "moving_share": 1.0},
-    "no walls, 30 % move": {
-        "scene": "arena",
-        "dynamism": 0.5,
-        "moving_share": 0.3,
-        "options": BARE,
+    **{f"office {level:g}": {"scene": "office", "dynamism": level} for level in (0.0, 0.5, 1.0)},
+    "arena, all move": {**ARENA, "moving_share": 1.0},
+    **{
+        f"no walls, {which} move": {**ARENA, "moving_share": share, "options": BARE}
+        for which, share in (("30 %", 0.3), ("50 %", 0.5), ("all", 1.0))
     },
-    "no walls, 50 % move": {
-        "scene": "arena",
-        "dynamism": 0.5,
-        "moving_share": 0.5,
-        "options": BARE,
-    },
-    "no walls, all move": {"scene": "arena", "dynamism": 0.5, "moving_share": 1.0, "options": BARE},
     "corridor": {"scene": "corridor", "dynamism": 0.0},
 }
 

@@ -17,9 +17,9 @@ import numpy as np
 from scipy.stats import spearmanr
 
 from scripts.comparison.recording import Recording
-from scripts.experiments.measured import table
 from scripts.experiments.shared import Row
 from scripts.experiments.study import Study
+from scripts.marks import table
 from scripts.metrics.judged import world_truth
 from slam.evaluation import metrics
 from slam.evaluation.consistency import KeptScans

@@ -25,9 +25,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes import build
-from scripts.experiments.measured import table
 from scripts.experiments.shared import Row
 from scripts.experiments.study import Study
+from scripts.marks import table
 from sim.core.seeds import Seeds
 from sim.world.sessions import Days
 from sim.world.times_of_day import clock_s

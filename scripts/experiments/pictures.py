@@ -24,7 +24,7 @@ from PIL import Image
 
 import scenes
 from scripts.benchmark.tracks import newest
-from scripts.experiments.measured import ended
+from scripts.console import ended
 from scripts.film.encode import film
 from sim.driving.pilot import Pilot
 from sim.simulation import Simulation
@@ -76,6 +76,7 @@ _TRACK_SHOTS: dict[str, dict[str, Any]] = {
     "moving-boards": {"from_s": 8.0, "far_m": 11.0},
     "slow-boards": {"from_s": 20.0, "far_m": 11.0},
     "half-turn": {"from_s": 8.0, "view": "top"},
+    "depth-camera": {"from_s": 12.0, "far_m": 13.0},
     "moving-day": {"from_s": 40.0, "view": "top"},
     "overnight": {"from_s": 54.0, "view": "top"},
     "kidnapped-in-a-crowd": {"from_s": 54.0, "view": "top"},
@@ -218,6 +219,7 @@ def with_clips(text: str, clips: Path) -> str:
     return _PICTURE.sub(linked, text)
 
 
+@ended
 def main(arguments: list[str] | None = None) -> int:
     """Make those asked for, all by default; 1 where there is no OpenGL."""
     known = [*clips(), CROWDS]
@@ -241,4 +243,4 @@ def main(arguments: list[str] | None = None) -> int:
 
 
 if __name__ == "__main__":
-    sys.exit(ended(main))
+    sys.exit(main())

@@ -11,19 +11,11 @@ import sys
 
 import numpy as np
 
-from scripts.comparison.recording import Recording
 from scripts.experiments import shared
-from scripts.experiments.shared import CM, Row, of
+from scripts.experiments.shared import CM, of
 from scripts.experiments.study import Study
 
 SLAMS = ("shunting", "shunting{range_error.learn=on}")
-
-
-def run(case: Row, drive: Recording) -> Row:
-    """And whether a systematic error was taken off at the end."""
-    row, track = shared.judged_with(case, drive)
-    learnt = getattr(track.system, "learnt_error", None)
-    return row | {"found": learnt is not None and learnt.found}
 
 
 STUDY = Study(
@@ -31,11 +23,11 @@ STUDY = Study(
     axes={"scanner": ("noise", "full"), "scene": ("office", "arena"), "level": (0.0, 0.5),
           "slam": SLAMS},
     drive=lambda case: shared.world_1(case, scanner=case["scanner"], every=8),
-    run=run, lines=("scene", "level", "scanner", "slam"),
+    run=shared.judged, lines=("scene", "level", "scanner", "slam"),
     columns={
         "ATE, cm": of("ate_unaligned_m", scale=CM), "worst": of("ate_unaligned_m", np.max, CM),
         "aligned": of("ate_se2_m", scale=CM),
-        "found": lambda rows: f"{sum(row['found'] for row in rows)} of {len(rows)}",
+        "found": lambda rows: f"{sum(row.get('found', False) for row in rows)} of {len(rows)}",
     },
     defaults={"seeds": 3, "first_seed": 0},
 )  # fmt: skip

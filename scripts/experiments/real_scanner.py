@@ -14,9 +14,9 @@ from collections.abc import Mapping, Sequence
 from pathlib import Path
 
 from scripts.card import beside
-from scripts.card.real import real_card, simulated_card
+from scripts.card.beside import real_card, simulated_card
+from scripts.console import ended
 from scripts.marks import fill_page
-from slam.errors import MobiliaError
 from slam.evaluation.scanner.card import ScannerCard
 
 ROOT = Path(__file__).resolve().parents[2]
@@ -45,7 +45,8 @@ def our_cards(scanners: Mapping[str, str]) -> Cards:
     return {name: simulated_card(scanner) for name, scanner in scanners.items()}
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@ended
+def main(arguments: Sequence[str] | None = None) -> None:
     """Fill the page, draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("--data", type=Path, default=os.environ.get("MOBILIA_DATA"),
@@ -54,18 +55,13 @@ def main(arguments: Sequence[str] | None = None) -> int:
     wanted = parser.parse_args(arguments)
     if wanted.data is None:
         parser.error("--data is missing, and MOBILIA_DATA is not set")
-    try:
-        one, half = real_cards(wanted.data, LOGS_1_DEG), real_cards(wanted.data, LOGS_HALF_DEG)
-        ours_one, ours_half = our_cards(OURS_1_DEG), our_cards(OURS_HALF_DEG)
-        page = wanted.root / PAGE
-        fill_page(page, "one-degree", "\n".join(beside.markdown(one, ours_one)))
-        fill_page(page, "half-degree", "\n".join(beside.markdown(half, ours_half)))
-        beside.draw(wanted.root / PICTURE, {**one, **half}, {**ours_one, **ours_half})
-    except MobiliaError as error:
-        print(f"real_scanner: {error}", file=sys.stderr)
-        return 2
+    one, half = real_cards(wanted.data, LOGS_1_DEG), real_cards(wanted.data, LOGS_HALF_DEG)
+    ours_one, ours_half = our_cards(OURS_1_DEG), our_cards(OURS_HALF_DEG)
+    page = wanted.root / PAGE
+    fill_page(page, "one-degree", "\n".join(beside.markdown(one, ours_one)))
+    fill_page(page, "half-degree", "\n".join(beside.markdown(half, ours_half)))
+    beside.draw(wanted.root / PICTURE, {**one, **half}, {**ours_one, **ours_half})
     print(f"wrote {page} and {wanted.root / PICTURE}")
-    return 0
 
 
 if __name__ == "__main__":

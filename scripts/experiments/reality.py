@@ -25,8 +25,9 @@ from typing import Any
 import numpy as np
 from scipy.stats import spearmanr
 
-from scripts.console import note
+from scripts.console import ended, note
 from scripts.log_twin.make import REFERENCE, housed, made, recorded
+from scripts.marks import table
 from slam import create
 from slam.errors import InvalidValueError, MobiliaError
 from slam.evaluation.metrics import ate
@@ -143,7 +144,7 @@ def correlation(pairs: Mapping[str, Sequence[tuple[float, float]]]) -> tuple[flo
     return float(by_log.mean()), float(low), float(high)
 
 
-def table() -> list[str]:
+def tables() -> list[str]:
     """The page's tables: what was predicted beside the logs, and what was simulated after."""
     measured = kept(REAL)
     lines, pairs = _beside(kept(PREDICTED), measured)
@@ -173,15 +174,13 @@ def _beside(
 ) -> tuple[list[str], dict[str, list[tuple[float, float]]]]:
     """A row a log, in each cell the error on the twin and on the log; and these, log by log."""
     slams = [s for s in SLAMS if any(s in row for row in measured.values())]
-    lines = ["| log | " + " | ".join(f"`{s}`" for s in slams) + " | ranks |"]
-    lines.append("|---|" + "---|" * (len(slams) + 1))
-    pairs: dict[str, list[tuple[float, float]]] = {}
+    rows, pairs = [], dict[str, list[tuple[float, float]]]()
     for log, row in measured.items():
         both = [(of_seeds(simulated[log]["errors_m"].get(s, {})), row.get(s)) for s in slams]
         pairs[log] = [(a, b) for a, b in both if a is not None and b is not None]
         cells = [" / ".join("–" if v is None else f"{v:.2g}" for v in pair) for pair in both]
-        lines.append(f"| {log} | " + " | ".join(cells) + f" | {_spearman(pairs[log]):+.2f} |")
-    return lines, pairs
+        rows.append([log, *cells, f"{_spearman(pairs[log]):+.2f}"])
+    return table(("log", *(f"`{s}`" for s in slams), "ranks"), rows).splitlines(), pairs
 
 
 def _spearman(rows: Sequence[tuple[float, float]]) -> float:
@@ -201,7 +200,8 @@ def _best(pairs: Mapping[str, Sequence[tuple[float, float]]]) -> str:
     return f"The best on the twin is the best on the log in {sum(best)} of {len(best)}."
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@ended
+def main(arguments: Sequence[str] | None = None) -> None:
     """One step."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("step", choices=("predict", "real", "after", "page"))
@@ -210,11 +210,10 @@ def main(arguments: Sequence[str] | None = None) -> int:
     parser.add_argument("--slams", nargs="+", default=SLAMS)
     given = parser.parse_args(arguments)
     if given.step == "page":
-        sys.stdout.write("\n".join(table()) + "\n")
-        return 0
+        print("\n".join(tables()))
+        return
     steps: dict[str, Step] = {"predict": predict, "real": real, "after": partial(simulate, AFTER)}
     steps[given.step](given.data, given.logs, given.slams)
-    return 0
 
 
 if __name__ == "__main__":

@@ -18,14 +18,9 @@ from scripts.experiments.study import Study
 from scripts.options import every_of
 from sim.sensors.lidar.registry import names
 
-GENERIC = "scanner(fov_deg=240,beams=481,rate_hz=20,sigma_m=0.02):noise"  # has no other error
 SCANNERS = [
-    *(
-        f"{name}:{errors}"
-        for name in sorted({*names()} - {"scanner"})
-        for errors in ("noise", "full")
-    ),
-    GENERIC,
+    *(f"{name}:{errors}" for name in names() if name != "scanner" for errors in ("noise", "full")),
+    "scanner(fov_deg=240,beams=481,rate_hz=20,sigma_m=0.02):noise",  # has no other error
 ]
 
 STUDY = Study(
@@ -34,17 +29,15 @@ STUDY = Study(
     drive=lambda case: shared.world_1(
         case, scanner=case["scanner"], every=every_of(case["scanner"], None, 8)
     ),
-    run=shared.judged,
-    lines=("scanner",),
+    run=shared.judged, lines=("scanner",),
     columns={
         "scans used": lambda rows: f"1 in {every_of(rows[0]['scanner'], None, 8)}",
         "median ATE, cm": of("ate_unaligned_m", scale=CM, form="{:.1f}"),
-        "largest, cm": of("ate_unaligned_m", np.max, CM, "{:.1f}"),
-        "lost": losses,
+        "largest, cm": of("ate_unaligned_m", np.max, CM, "{:.1f}"), "lost": losses,
         "ms an update": of("ms_per_scan_p50", form="{:.1f}"),
     },
     defaults={"seeds": 3, "first_seed": 100, "seconds": 30.0},
-)
+)  # fmt: skip
 
 
 if __name__ == "__main__":

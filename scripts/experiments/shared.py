@@ -40,19 +40,13 @@ def kept(frames: Sequence[Frame], every: int) -> list[Frame]:
 
 
 def judged(case: Row, drive: Recording) -> Row:
-    """What ``judged_with`` counts."""
-    return judged_with(case, drive)[0]
-
-
-def judged_with(case: Row, drive: Recording) -> tuple[Row, Track]:
     """The run of ``case["slam"]`` over one frame in ``case["every"]`` (all): each column of a
     comparison, and what it admitted.
 
     error_m, lost_s  up to the loss, without the time after the robot was carried elsewhere
     due, told        scans that are off for long enough, and those of them that it admits
     good, false      scans that are not off, and those of them that it does not trust
-
-    And the SLAM as it is then.
+    found            of a SLAM that learns the scanner's systematic error: whether it took one off
     """
     every = case.get("every", 1)
     frames = kept(drive.frames, every)
@@ -61,7 +55,7 @@ def judged_with(case: Row, drive: Recording) -> tuple[Row, Track]:
     final = None if failure else track.final()
     row = scored(track, final, failure, truth)
     if failure is not None:
-        return row | {"error_m": math.inf, "lost_s": row["lost_at_s"]}, track
+        return row | {"error_m": math.inf, "lost_s": row["lost_at_s"]}
     run = Judged.of(track, truth)
     off, converged, due = run.is_off(), run.converged(), run.is_due()
     lost_s, error_m = _loss(run, drive.truth(), every)
@@ -70,7 +64,9 @@ def judged_with(case: Row, drive: Recording) -> tuple[Row, Track]:
         "doubted": ~converged,
     }  # fmt: skip
     row |= {name: int(which.sum()) for name, which in counts.items()}
-    return row | {"error_m": error_m, "lost_s": lost_s}, track
+    if (learnt := getattr(track.system, "learnt_error", None)) is not None:
+        row["found"] = learnt.found
+    return row | {"error_m": error_m, "lost_s": lost_s}
 
 
 def _loss(run: Judged, whole: Trajectory, every: int) -> tuple[float | None, float]:

@@ -12,6 +12,7 @@ import argparse
 import hashlib
 import importlib
 import json
+import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
@@ -24,16 +25,72 @@ import scenes
 import sim
 import slam
 from scripts.comparison.recording import load, record
-from scripts.experiments.measured import add_options, ended, head, seeds_of, table
+from scripts.console import ended
 from scripts.experiments.shared import Column, Row, losses
 from scripts.imports import scripts_of, sources
 from scripts.jobs import Job, run_jobs
-from scripts.marks import fill_page
+from scripts.machine import machine, versions
+from scripts.marks import fill_page, filled, table
 from scripts.names import file_name
-from scripts.result_files import write
+from scripts.result_files import RESULTS, SCHEMA, commit, write
 from sim.core.versions import WORLD
 from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError
+
+
+def add_options(parser: argparse.ArgumentParser, out: str, page: Path) -> None:
+    """``--seeds``, ``--first-seed``, ``--seconds``, ``--jobs``, ``--results``, ``--page``."""
+    parser.add_argument("--seeds", type=int, default=10, help="how many")
+    add_run_options(parser, out, page)
+
+
+def add_run_options(parser: argparse.ArgumentParser, out: str, page: Path) -> None:
+    """The same without ``--seeds``, where these follow from something else."""
+    parser.add_argument("--first-seed", type=int, default=500, help="nobody tuned on these")
+    parser.add_argument("--seconds", type=float, default=60.0, help="of each run, simulated")
+    parser.add_argument("--jobs", type=int, default=1, help="processes")
+    parser.add_argument("--results", type=Path, default=RESULTS / out)
+    parser.add_argument("--page", type=Path, default=page)
+    parser.add_argument("--no-page", action="store_true", help="leave the page as it is")
+
+
+def seeds_of(wanted: argparse.Namespace) -> list[int]:
+    """Of the two options."""
+    return list(range(wanted.first_seed, wanted.first_seed + wanted.seeds))
+
+
+def head(
+    wanted: argparse.Namespace,
+    mark: str,
+    arguments: Sequence[str] | None,
+    *asked: str,
+    package: str = "scripts.experiments",
+) -> dict[str, Any]:
+    """The head of the results file, with the options ``asked``; call it before anything is run.
+
+    ``mark`` names the module of ``package``, and its place in the page. Of absolute paths the
+    command keeps the last part: where a machine keeps them helps nobody.
+
+    Raises ``InvalidValueError`` where the page has no such mark, or where the project's own results
+    would name a commit that is not the code here; ``OSError`` for no such page.
+    """
+    if not wanted.no_page:
+        filled(wanted.page.read_text(encoding="utf-8"), mark, "", wanted.page)
+    own = wanted.results.resolve().parent == RESULTS
+    given = sys.argv[1:] if arguments is None else arguments
+    words = [Path(word).name if Path(word).is_absolute() else word for word in given]
+    return {
+        "schema": SCHEMA,
+        "command": shlex.join(["python", "-m", f"{package}.{mark}", *words]),
+        "commit": commit() if own else None,
+        "world": WORLD,
+        "machine": machine(),
+        "versions": versions(),
+        "seeds": seeds_of(wanted),
+        "seconds": wanted.seconds,
+        **{key: getattr(wanted, key) for key in asked},
+    }
+
 
 RECORDINGS, ROWS = "recordings", "rows"  # folders of the jobs' files
 ALL = "all"  # in the place of an axis over which a line of the table is pooled
@@ -88,11 +145,6 @@ class Study:
     results: bool = False
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
-    def main(self, arguments: Sequence[str] | None = None) -> int:
-        """The command: make what is missing, print the table, write results, picture and page."""
-        wanted = self._parser().parse_args(arguments)
-        return ended(lambda: self._carry_out(wanted, arguments))
-
     def _parser(self) -> argparse.ArgumentParser:
         module = sys.modules[self.run.__module__]
         parser = argparse.ArgumentParser(prog=self.name, description=module.__doc__)
@@ -109,7 +161,10 @@ class Study:
         parser.set_defaults(**self.defaults)
         return parser
 
-    def _carry_out(self, wanted: argparse.Namespace, arguments: Sequence[str] | None) -> None:
+    @ended
+    def main(self, arguments: Sequence[str] | None = None) -> None:
+        """The command: make what is missing, print the table, write results, picture and page."""
+        wanted = self._parser().parse_args(arguments)
         wanted.no_page = wanted.no_page or self.page is None
         first = head(wanted, self.name, arguments, *self.axes)
         rows = self.rows(self.cases(wanted), wanted.folder, wanted.jobs)
@@ -135,7 +190,7 @@ class Study:
 
     def rows(self, cases: Sequence[Row], folder: Path, jobs: int) -> list[Row]:
         """The row of each case, made where it is not there."""
-        drives = [_recorded(drive) if (drive := self.drive(case)) else None for case in cases]
+        drives = [recorded(drive) if (drive := self.drive(case)) else None for case in cases]
         missing = {job.name: job for job in drives if job is not None}
         if missing:
             run_jobs(missing.values(), folder / RECORDINGS, processes=jobs, title="drives")
@@ -209,7 +264,7 @@ def _scripts(module: str) -> tuple[Path, ...]:
     return scripts_of(str(importlib.import_module(module).__file__), module)
 
 
-def _recorded(drive: Row) -> Job:
+def recorded(drive: Row) -> Job:
     """The job that simulates a drive and keeps one scan in ``every``."""
     every = drive.get("every", 1)
     recipe = Recipe(**{key: value for key, value in drive.items() if key != "every"})

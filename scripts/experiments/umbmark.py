@@ -20,7 +20,7 @@ import numpy as np
 from matplotlib.figure import Figure
 
 from scripts.figures import save
-from scripts.marks import fill_page
+from scripts.marks import fill_page, table
 from sim.sensors.odometry.encoders import OdometryConfig, WheelOdometry
 from slam.frames import Float
 
@@ -28,6 +28,8 @@ SIDE, TRACK = 4.0, 0.33  # m
 SPEED, TURNING, RATE = 0.5, 0.8, 15.0  # m/s, rad/s, 1/s
 RUNS, ROBOTS = 5, 30
 PRESETS = ("pioneer3dx", "probabilistic_robotics", "ideal")
+HEADS = ("robot", "Eb true", "Eb by UMBmark", "Ed true", "Ed by UMBmark", "farther centre")
+PRESET_HEADS = ("preset", "farther centre (systematic)", "spread of one way's ends (random)")
 BLUE, RED, INK = "#1f61be", "#ce2c3c", "#222222"
 
 
@@ -118,30 +120,19 @@ def figure(units: Sequence[Unit]) -> Figure:
 
 def tables(units: Sequence[Unit]) -> str:
     """What stands on the page between its marks."""
-    lines = [
-        "| robot | Eb true | Eb by UMBmark | Ed true | Ed by UMBmark | farther centre |",
-        "|---|---|---|---|---|---|",
-    ]
+    robots = []
     for k, unit in enumerate(units):
-        _, track, ratio = unit.errors
-        eb, ed = unit.estimate
-        lines.append(
-            f"| {k + 1} | {track:.4f} | {eb:.4f} | {ratio:.4f} | {ed:.4f} | "
-            f"{1e3 * unit.worst:.0f} mm |"
-        )
-    lines += [
-        "",
-        f"Median over {ROBOTS} robots of each preset, five squares each way:",
-        "",
-        "| preset | farther centre (systematic) | spread of one way's ends (random) |",
-        "|---|---|---|",
-    ]
+        (_, track, ratio), (eb, ed) = unit.errors, unit.estimate
+        numbers = (f"{number:.4f}" for number in (track, eb, ratio, ed))
+        robots.append([str(k + 1), *numbers, f"{1e3 * unit.worst:.0f} mm"])
+    presets = []
     for name in PRESETS:
         many = [measure_unit(name, seed) for seed in range(ROBOTS)]
         worst = float(np.median([u.worst for u in many]))
         spread = float(np.median([u.ends.std(axis=1).mean() for u in many]))
-        lines.append(f"| `{name}` | {1e3 * worst:.0f} mm | {1e3 * spread:.0f} mm |")
-    return "\n".join(lines)
+        presets.append([f"`{name}`", f"{1e3 * worst:.0f} mm", f"{1e3 * spread:.0f} mm"])
+    told = f"Median over {ROBOTS} robots of each preset, five squares each way:"
+    return "\n\n".join((table(HEADS, robots), told, table(PRESET_HEADS, presets)))
 
 
 def main() -> None:

@@ -4,20 +4,17 @@
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.again import run_of, why_no_run
+from scripts.comparison.again import Again, again
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.show import Show
 from scripts.film.stage import Room, Stage
 from scripts.names import is_run
-from scripts.options import admitted
-from scripts.output import RECIPE, read_recipe_words, scenes_of, slams_of
-from sim.core.versions import check_world, world_of
+from scripts.output import RECIPE
 from sim.moments import Moment, thinned, toured
-from sim.recording.recipe import read_recipe
 from sim.recording.sums import check_vouched
 from sim.recording.verify import check_bag
 from sim.simulation import Simulation, n_frames
@@ -37,19 +34,7 @@ from slam.logs.mounting import MountingTest, remounted
 from slam.oracle import Oracle
 from slam.replay import Replay, systems_named
 
-# Of a run's settings.
-KNOBS = ("motion", "change", "crowd")
-SIMULATED = (
-    "scene",
-    "seconds",
-    "seed",
-    "dynamism",
-    *KNOBS,
-    "scan_height_m",
-    "laser",
-    "events",
-    "robot",
-)
+KNOBS = ("motion", "change", "crowd")  # of a run's settings
 FEW_RETURNS = 0.1  # share of the beams of a scan; fewer return: the scan is as good as empty
 
 
@@ -113,46 +98,45 @@ def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) ->
     any known format.
 
     view   of the 3D camera, None for none
-    trust  whether a scene that is code, by the name that a file there has, is run; its SLAM's name
-           stays one from a file
-    Raises ``LogFormatError`` that says what is missing or wrong there, ``UntrustedNameError``
-    without ``trust``, ``WorldVersionError`` for a run of another version of the world.
+    Raises as ``scripts.comparison.again.again``, which has ``trust``, too.
     """
-    if is_run(path):
-        return of_compared(path, view=view, trust=trust)
     recipe = path / RECIPE
-    if not recipe.exists():
+    if not (is_run(path) or recipe.exists()):
         check_vouched(recipe)  # one that is listed is lost: not what a log is
         return of_log(path)
-    words = read_recipe_words(recipe)
-    if "recipe" in words:
-        return of_episode(path, view=view, trust=trust)
-    settings = words.get("settings")
-    if not isinstance(settings, dict):
-        raise LogFormatError(recipe, "no recipe of a run: it has no settings")
-    slams = [name for name in slams_of(recipe, settings) if name != "odometry"]
-    slam = slams[0] if slams else ""
-    if "log" in settings:
-        raise LogFormatError(
-            path, f"a run on a log, which is not kept in it: render '{settings['log']}' itself"
-            + (f" with --slam {slam}" if slam else "")
-        )  # fmt: skip
-    if "scene" not in settings or "seconds" not in settings:
-        raise LogFormatError(path, why_no_run(path, words.get("command", "?")))
-    check_world(recipe, world_of(recipe, words))
-    known = {key: settings[key] for key in SIMULATED if key in settings}
-    known["scene"] = admitted(scenes_of(recipe, {"scene": settings["scene"]})[0], "scene", trust)
+    found = again(path, trust)
     try:
-        return replace(of_scene(known, view=view), slam=slam)
+        if found.twin:
+            return _of_twin(found, view)
+        settings = {**found.settings, "seconds": found.seconds}
+        return replace(of_scene(settings, view=view, every=found.every), slam=found.slam)
     except (TypeError, ValueError, UnknownNameError) as error:
-        raise LogFormatError(recipe, f"no recipe of a run: {error}") from error
+        raise LogFormatError(path, f"no recipe of a run: {error}") from error
 
 
-def of_scene(settings: Mapping[str, Any], *, view: str | None = "follow") -> Footage:
+def _of_twin(found: Again, view: str | None) -> Footage:
+    """An episode that is one of three twins."""
+    twins = Twins(**found.settings, labels=True, seconds=found.seconds)
+    footage = of_simulation(
+        twins.simulation,
+        lambda: twins.moments(found.twin),
+        seconds=found.seconds,
+        title=title_of({**found.settings, "twin": found.twin}),
+        view=None,  # the room of a twin is another one than its drive's
+    )
+    if view is not None:
+        footage.no_camera = "this episode is one of three twins, whose rooms only the plan shows"
+    return footage
+
+
+def of_scene(
+    settings: Mapping[str, Any], *, view: str | None = "follow", every: int = 1
+) -> Footage:
     """A simulated tour: scene, seconds, and what ``Simulation`` takes."""
     seconds = settings["seconds"]
     simulation = Simulation(**{k: v for k, v in settings.items() if k != "seconds"}, labels=True)
-    return of_simulation(simulation, seconds=seconds, title=title_of(settings), view=view)
+    title = title_of(settings)
+    return of_simulation(simulation, seconds=seconds, title=title, view=view, every=every)
 
 
 def of_simulation(
@@ -179,44 +163,6 @@ def of_simulation(
         stream=stream, stage=stage, title=title, duration_s=float(seconds),
         no_camera=stage.no_camera, made_with={"simulation": made_with},
     )  # fmt: skip
-
-
-def of_episode(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
-    """An episode of a dataset, made again from its recipe."""
-    made = read_recipe(path / RECIPE)
-    check_world(path / RECIPE, made.world)
-    recipe = replace(made.recipe, scene=admitted(made.recipe.scene, "scene", trust))
-    settings = {**asdict(recipe), **recipe.options}
-    settings.pop("twin")
-    if not recipe.twin:
-        simulation = Simulation(**recipe.simulation())
-        return of_simulation(
-            simulation, seconds=recipe.seconds, title=title_of(settings), view=view
-        )
-    twins = Twins(**recipe.simulation(), seconds=recipe.seconds)
-    footage = of_simulation(
-        twins.simulation,
-        lambda: twins.moments(recipe.twin),
-        seconds=recipe.seconds,
-        title=title_of({**settings, "twin": recipe.twin}),
-        view=None,  # the room of a twin is another one than its drive's
-    )
-    if view is not None:
-        footage.no_camera = "this episode is one of three twins, whose rooms only the plan shows"
-    return footage
-
-
-def of_compared(path: Path, *, view: str | None = "follow", trust: bool = False) -> Footage:
-    """A run of a comparison, made again with the scans that its SLAMs got."""
-    again = run_of(path)
-    recipe = replace(again.recipe, scene=admitted(again.recipe.scene, "scene", trust))
-    simulation = Simulation(**recipe.simulation())
-    title = title_of({**asdict(recipe), **recipe.options})
-    footage = of_simulation(
-        simulation, seconds=recipe.seconds, title=title, view=view, every=again.every
-    )
-    footage.slam = next((name for name in again.slams if name != "odometry"), "")
-    return footage
 
 
 def of_log(

@@ -19,7 +19,7 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scripts.experiments.measured import ended
+from scripts.console import ended
 from scripts.figures import COLORS, save, styled
 from scripts.integrity.kidnap import kidnapped, targets
 from scripts.integrity.labelled import off
@@ -141,15 +141,15 @@ def _draw(above: Axes, below: Axes, course: Course) -> None:
     below.set_xlabel("time [s]")
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@ended
+def main(arguments: Sequence[str] | None = None) -> None:
     """Draw the picture."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--out", type=Path, default=PICTURE)
     wanted = parser.parse_args(arguments)
     picture(wanted.out)
     print(f"wrote {wanted.out}")
-    return 0
 
 
 if __name__ == "__main__":
-    sys.exit(ended(main))
+    sys.exit(main())

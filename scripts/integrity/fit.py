@@ -23,13 +23,14 @@ from typing import Any
 import numpy as np
 
 from scripts import workers
-from scripts.experiments.measured import add_options, ended, head, seeds_of, table
+from scripts.console import ended
+from scripts.experiments.study import add_options, head, seeds_of
 from scripts.integrity import reliability, weights
 from scripts.integrity.campaign import logs_in
 from scripts.integrity.labelled import Labelled
 from scripts.integrity.reliability import Bin, Tested, curve, off_by
 from scripts.integrity.sources import PLANES, TRACKS, collected, sources
-from scripts.marks import fill_page
+from scripts.marks import fill_page, table
 from scripts.options import whole
 from scripts.result_files import write
 from slam.errors import InvalidValueError, UnknownNameError
@@ -123,7 +124,8 @@ def _parser() -> argparse.ArgumentParser:
     return parser
 
 
-def main(arguments: Sequence[str] | None = None) -> int:
+@ended
+def main(arguments: Sequence[str] | None = None) -> None:
     """Print the tables, write the results and the page."""
     wanted = _parser().parse_args(arguments)
     for name in wanted.streams:
@@ -148,7 +150,6 @@ def main(arguments: Sequence[str] | None = None) -> int:
     for mark, filled in texts.items():
         if not wanted.no_page:
             fill_page(wanted.page, mark, filled)
-    return 0
 
 
 def _test(wanted: argparse.Namespace, tables: Tables) -> str:
@@ -164,4 +165,4 @@ def _test(wanted: argparse.Namespace, tables: Tables) -> str:
 
 
 if __name__ == "__main__":
-    sys.exit(ended(main))
+    sys.exit(main())

@@ -19,13 +19,13 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scripts.experiments.measured import table
 from scripts.figures import COLORS, save, styled
 from scripts.integrity.counting import ALERT_M
 from scripts.integrity.kidnap import kidnapped, scans_after, targets
 from scripts.integrity.labelled import WRONG_RAD, off
 from scripts.integrity.plane import StreamSpec, frames
 from scripts.integrity.ways import DECIDABLE, EACH, MAPPED_S, WAYS
+from scripts.marks import table
 from slam import se2
 from slam.evaluation.statistics import central_interval
 from slam.frames import Float, Frame

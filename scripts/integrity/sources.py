@@ -5,12 +5,14 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
-from dataclasses import asdict, replace
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
+from scripts.benchmark.tracks import chosen
 from scripts.comparison.recording import load
-from scripts.experiments.recorded import Stream, make_missing
+from scripts.experiments.shared import on_stream
+from scripts.experiments.study import recorded
 from scripts.integrity.campaign import PLANE
 from scripts.integrity.labelled import Labelled, labelled
 from scripts.integrity.plane import KINDS, StreamSpec, frames
@@ -34,6 +36,22 @@ CODE = (
     ROOT / "slam", *PLANE,
     *(ROOT / "scripts" / "integrity" / f"{name}.py" for name in ("kidnap", "labelled")),
 )  # fmt: skip
+
+
+@dataclass(frozen=True, kw_only=True)
+class Stream:
+    """A track at a level with a seed."""
+
+    track: str
+    level: float
+    seed: int
+
+    def simulated(self) -> Job:
+        """The job that records it."""
+        every = chosen([self.track])[0].every
+        return recorded({"every": every, **on_stream(self.track, self.level, self.seed, 0.0)})
+
+
 Source = Stream | StreamSpec | Path
 """A track, a stream of the plane, or the log of a real robot."""
 
@@ -41,7 +59,7 @@ Source = Stream | StreamSpec | Path
 def name_of(source: Source) -> str:
     """Of a stream, as files and tables call it."""
     if isinstance(source, Stream):
-        return source.name
+        return f"{source.track}_{source.level:g}_s{source.seed}"
     if isinstance(source, Path):
         return f"log-{source.name.partition('.')[0]}"
     return f"plane-{source.kind}_s{source.seed}"
@@ -50,14 +68,14 @@ def name_of(source: Source) -> str:
 def building_of(source: Source) -> str:
     """Streams with another one were made in other rooms."""
     if isinstance(source, Stream):
-        return str(source.simulated()["scene"])
+        return str(source.simulated().arguments["scene"])
     return name_of(source) if isinstance(source, Path) else source.settings.layout
 
 
 def frames_of(source: Source, folder: Path) -> Sequence[Frame]:
     """Simulated, from its recording in ``folder``, or of a log where a first pass saw it."""
     if isinstance(source, Stream):
-        return load(source.path(folder)).frames
+        return load(folder / source.simulated().file_name()).frames
     if isinstance(source, StreamSpec):
         return frames(source)
     log = [frame for frame in open_log(source) if frame.scan is not None][:MOST_SCANS]
@@ -93,7 +111,8 @@ def with_others(all_: Sequence[Source]) -> list[tuple[Source, Source]]:
 
 def collected(all_: Sequence[Source], folder: Path, jobs: int) -> list[Labelled]:
     """The labelled scans of all, in order; those of the same code are kept in ``folder``."""
-    make_missing([one for one in all_ if isinstance(one, Stream)], folder, jobs)
+    drives = [one.simulated() for one in all_ if isinstance(one, Stream)]
+    run_jobs(drives, folder, processes=jobs, title="drives")
     wanted = [
         Job(
             name=name_of(own),

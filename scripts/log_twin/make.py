@@ -1,31 +1,56 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A log's twin: its building, its way, its scanner, odometry as wrong as its own."""
+"""A log's twin: building, way, scanner, odometry as wrong as its own; both in one picture."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
 import numpy as np
+from matplotlib.figure import Figure
 
 from scenes import build
 from scenes.crowd import crowd_of
 from scenes.crowd_kinds import with_crowd
+from scenes.from_map import FromMap, plan, write
 from scenes.scene import Scene
-from scripts.log_twin.building import written_building
+from scripts.figures import save, styled
 from sim.core.dynamism import Dynamism
 from sim.sensors.odometry.fit import OdometryFit, fitted
+from sim.twins.faces import laid
 from sim.twins.log import Drive, LogTwin, scanner_like
-from slam import create
+from slam import create, se2
 from slam.errors import InvalidValueError
-from slam.evaluation.evidence import Beside, beside
+from slam.evaluation.evidence import Beside, beside, evidence_of
 from slam.evaluation.scanner.card import measure
 from slam.frames import Float, Frame, LaserSpec, Stream, StreamMetadata
 from slam.logs import open_log
 from slam.replay import Replay
+
+PASSES = 2  # the second time with better poses
+
+
+def written_building(
+    frames: Sequence[Frame], poses: Float, stem: Path, log: str
+) -> tuple[Path, Float]:
+    """Write the scene of what scans at ``poses`` show, as STEM.toml and STEM.xml.
+
+    Returns the former and the poses (n, 3), put right by its walls.
+    """
+    scans = [frame.scan for frame in frames if frame.scan is not None]
+    mount, angles = scans[0].spec.T_robot_laser, scans[0].spec.angles
+    ranges = np.array([np.where(scan.valid, scan.ranges, np.nan) for scan in scans])
+    for _ in range(PASSES):
+        raster = evidence_of(scans, poses).raster()
+        drawn = plan(raster, FromMap(path=poses[:, :2], things=False, few=False), source=log)
+        lasers = np.array([se2.compose(pose, mount) for pose in poses])
+        walls, lasers = laid(drawn.walls, lasers, ranges.astype(np.float64), angles)
+        poses = np.array([se2.compose(laser, se2.inverse(mount)) for laser in lasers])
+    return write(replace(drawn, walls=walls), stem, made_of=log), poses
+
 
 REFERENCE = "reference"
 LEAST_SCANS = 30
@@ -155,3 +180,25 @@ def _stream(frames: list[Frame], spec: LaserSpec, extra: Mapping[str, Any]) -> S
         source="simulation", laser=spec, truth="simulator", extra={"twin": dict(extra)}
     )
     return Stream(metadata=metadata, frames=lambda: frames, length=len(frames))
+
+
+SHOWN_M = 0.3  # differences beyond are drawn as that
+MOST_POINTS = 120_000
+
+
+@styled()
+def differences(path: Path, found: Beside, poses: Float, title: str) -> None:
+    """The log's returns, coloured by how much farther (red) or nearer (blue) the twin's lie."""
+    every = max(1, len(found.apart) // MOST_POINTS)
+    x, y = found.points[::every].T
+    apart = np.clip(found.apart[::every], -SHOWN_M, SHOWN_M)
+    order = np.argsort(np.abs(apart), kind="stable")
+    span = np.ptp(found.points, axis=0) / np.ptp(found.points, axis=0).max()
+    figure = Figure(figsize=(2.5 + 7.0 * float(span[0]), 1.5 + 7.0 * float(span[1])))
+    axes = figure.add_subplot()
+    drawn = axes.scatter(x[order], y[order], c=apart[order], s=1.0, cmap="coolwarm", linewidths=0)
+    axes.plot(poses[:, 0], poses[:, 1], color="#168c5a", linewidth=0.5)
+    axes.set_aspect("equal")
+    axes.set(xlabel="x, m", ylabel="y, m", title=title)
+    figure.colorbar(drawn, ax=axes, shrink=0.7, label="the twin's return lies farther, m")
+    save(figure, path)

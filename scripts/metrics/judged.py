@@ -11,6 +11,7 @@ from functools import cached_property
 import numpy as np
 from numpy.typing import NDArray
 
+from slam import se2
 from slam.errors import InvalidValueError
 from slam.evaluation import lost, metrics
 from slam.frames import NS_PER_S, Float, Frame
@@ -30,6 +31,13 @@ def world_truth(frames: Sequence[Frame]) -> Trajectory:
         stamps_ns=np.array([frame.stamp_ns for frame in frames]),
         poses=np.array([frame.truth for frame in frames]),
     )
+
+
+def in_first_frame(truth: Trajectory) -> Trajectory:
+    """The truth as seen from its own first pose, the frame in which a SLAM starts."""
+    T_first_world = se2.inverse(truth.poses[0])
+    poses = np.array([se2.compose(T_first_world, T_world_robot) for T_world_robot in truth.poses])
+    return Trajectory(stamps_ns=truth.stamps_ns, poses=poses)
 
 
 def lost_s(pairs: metrics.PoseErrors, truth: Trajectory) -> float | None:

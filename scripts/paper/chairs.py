@@ -7,10 +7,18 @@ from typing import Any
 
 from scripts.figures import styled
 from scripts.paper.comparison import TABLE_3, below_printed, paper_table
-from scripts.paper.map_figures import active, legend_below, map_panels, window_over
-from scripts.paper.report import COLORS, Report, draw_activities, draw_ellipses, error_axes
-from scripts.paper.room_pages import RULE, fig_rmse, score_table, seconds_of, verdict
-from scripts.paper.rooms import run_all
+from scripts.paper.report import (
+    COLORS,
+    Report,
+    active,
+    draw_activities,
+    draw_ellipses,
+    error_axes,
+    legend_below,
+    map_panels,
+    window_over,
+)
+from scripts.paper.room_pages import RULE, fig_rmse, run_all, score_table, seconds_of, verdict
 from scripts.paper.runs import Plan, Run
 
 VARIANTS: dict[str, dict[str, Any]] = {"walls": {"walls": "visible"}, "no-walls": {"walls": "none"}}

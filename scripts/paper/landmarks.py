@@ -16,15 +16,19 @@ import numpy as np
 from scripts.figures import styled
 from scripts.paper.census import GATE_M, PEAK
 from scripts.paper.comparison import TABLE_2, below_printed, paper_table
-from scripts.paper.map_figures import active, legend_below, map_panels, window_about, window_over
 from scripts.paper.point_runs import SHUNTING, run_one
 from scripts.paper.report import (
     COLORS,
     Report,
+    active,
     draw_activities,
     draw_ellipses,
     error_axes,
+    legend_below,
+    map_panels,
     new_figure,
+    window_about,
+    window_over,
 )  # fmt: skip
 from scripts.paper.runs import Plan, Run, job, sign_test, spread
 from slam.frames import Float

@@ -9,8 +9,15 @@ import numpy as np
 
 from scripts.figures import styled
 from scripts.paper.report import Report, draw_activities, new_figure
-from scripts.paper.room_pages import RULE, fig_rmse, path_length, score_table, seconds_of, verdict
-from scripts.paper.rooms import run_all
+from scripts.paper.room_pages import (
+    RULE,
+    fig_rmse,
+    path_length,
+    run_all,
+    score_table,
+    seconds_of,
+    verdict,
+)
 from scripts.paper.runs import Plan, Run
 
 DYNAMISM = 0.5

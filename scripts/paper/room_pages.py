@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Tables and figures that the experiments in rooms share."""
+"""The runs, tables and figures that the experiments in rooms share."""
 
 from __future__ import annotations
 
@@ -10,17 +10,43 @@ from typing import Any
 
 import numpy as np
 
+from scripts.paper import rooms
 from scripts.paper.report import COLORS, Report, new_figure
 from scripts.paper.rooms import FAILED_M, FAILED_RAD, SYSTEMS
-from scripts.paper.runs import Run, SignTest, sign_test, spread
+from scripts.paper.runs import Plan, Run, SignTest, job, sign_test, spread
 from slam.frames import Float
 
 NAMES = tuple(SYSTEMS)
+SECONDS = 60.0  # of a tour
 RULE = (
     f"Failed: RMSE above {FAILED_M} m or {FAILED_RAD} rad, or the SLAM itself says at the end that "
     "it is lost. “Shunting” sees the beams, with its own preset and with the paper's; “shunting, "
     "features” and “shunting, paper preset” see point features (the EKF's corners) with IPJC."
 )
+
+
+def run_all(
+    report: Report, plan: Plan, scene: str, dynamism: float, variants: Mapping[str, dict[str, Any]]
+) -> dict[str, list[Run]]:
+    """Every variant (name -> options of the scene) over all seeds."""
+    seconds = 8.0 if plan.quick else SECONDS
+    seeds = plan.seed_list()
+    runs = report.run(
+        job(
+            f"{variant}-seed-{seed}",
+            rooms.run_one,
+            scene=scene,
+            options=options,
+            dynamism=dynamism,
+            seed=seed,
+            seconds=seconds,
+            keep=seed == seeds[0],
+        )
+        for variant, options in variants.items()
+        for seed in seeds
+    )
+    report.systems(SYSTEMS)
+    return {v: [runs[f"{v}-seed-{seed}"] for seed in seeds] for v in variants}
 
 
 def score_table(report: Report, runs: Sequence[Run]) -> None:

@@ -3,14 +3,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scripts.paper.report import Report
-from scripts.paper.runs import Plan, Run, follow, job, map_arrays, pose_numbers, save_run, truth_of
+from scripts.paper.runs import follow, map_arrays, pose_numbers, save_run, truth_of
 from sim.core.dynamism import Dynamism
 from sim.simulation import stream
 from slam import create, se2
@@ -19,7 +18,6 @@ from slam.frames import Float, Frame
 from slam.frontend.odometry_steps import thinned
 
 STRIDE = 5  # 37.5 Hz thinned to 7.5 Hz
-SECONDS = 60.0
 FAILED_M, FAILED_RAD = 0.5, 0.2
 SYSTEMS: dict[str, tuple[str, dict[str, Any]]] = {
     "odometry": ("odometry", {}),
@@ -85,27 +83,3 @@ def raw_points(frames: Sequence[Frame], poses: Float) -> Float:
         points = np.stack([ranges * np.cos(angles), ranges * np.sin(angles)], axis=1)
         out.append(se2.transform(se2.compose(pose, spec.T_robot_laser), points))
     return np.concatenate(out)
-
-
-def run_all(
-    report: Report, plan: Plan, scene: str, dynamism: float, variants: Mapping[str, dict[str, Any]]
-) -> dict[str, list[Run]]:
-    """Every variant (name -> options of the scene) over all seeds."""
-    seconds = 8.0 if plan.quick else SECONDS
-    seeds = plan.seed_list()
-    runs = report.run(
-        job(
-            f"{variant}-seed-{seed}",
-            run_one,
-            scene=scene,
-            options=options,
-            dynamism=dynamism,
-            seed=seed,
-            seconds=seconds,
-            keep=seed == seeds[0],
-        )
-        for variant, options in variants.items()
-        for seed in seeds
-    )
-    report.systems(SYSTEMS)
-    return {v: [runs[f"{v}-seed-{seed}"] for seed in seeds] for v in variants}

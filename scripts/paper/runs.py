@@ -4,12 +4,10 @@
 from __future__ import annotations
 
 import hashlib
-import inspect
 import json
 import math
-from collections.abc import Callable, Iterable, Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
-from functools import cache
 from pathlib import Path
 from typing import Any
 
@@ -19,11 +17,10 @@ from numpy.typing import ArrayLike, NDArray
 import scenes
 import sim
 import slam
-from scripts.imports import with_imports
+from scripts.imports import code_of
 from scripts.jobs import Job
-from scripts.metrics.judged import Judged, world_truth
+from scripts.metrics.judged import Judged, in_first_frame, world_truth
 from scripts.metrics.table import METRICS
-from slam import se2
 from slam.archives import read_arrays
 from slam.errors import InvalidValueError, LogFormatError
 from slam.evaluation.statistics import paired
@@ -35,12 +32,6 @@ from slam.trajectory import Trajectory
 QUANTITIES = ("x", "y", "θ")
 FIRST_SEED = 200  # of the simulated runs: nothing was tuned or tested on it and those after it
 SEEDS, QUICK_SEEDS = 20, 1
-_SCRIPTS = Path(__file__).parents[1]
-# Of what the runs' modules import: these make pages of runs, and no run depends on them.
-_PAGES = frozenset({
-    "comparison", "console", "figures", "imports", "interrupt", "jobs", "machine", "options",
-    "output", "report", "workers",
-})  # fmt: skip
 _PARK = frozenset({
     "features_trees", "features_segments", "aa3_gpsx", "rfs_measurements", "rfs_inputs", "rfs_gps",
     "graph_known_association",
@@ -106,25 +97,15 @@ def load_run(path: Path) -> Run:
 
 
 def job(name: str, call: Any, /, **arguments: Any) -> Job:
-    """A job that is made again when anything it depends on changes."""
-    if "data" in arguments:
-        arguments["data"] = str(Path(arguments["data"]).resolve())
-    return Job(name=name, call=call, arguments=arguments, code=depends_on(call, arguments))
-
-
-def depends_on(call: Callable[..., None], arguments: Mapping[str, Any]) -> tuple[Path, ...]:
-    """Files and folders: the SLAMs, the module of ``call`` with the scripts that it imports; with
-    a ``scene`` the simulator and the rooms; with ``data`` the files of the dataset."""
+    """A job that is made again when what it depends on changes: the SLAMs and the scripts that
+    ``call`` imports; with a ``scene`` the simulator and the rooms; with ``data`` the dataset."""
     packages = (slam, sim, scenes) if "scene" in arguments else (slam,)
-    folders = [Path(str(package.__file__)).parent for package in packages]
-    data = park_files(Path(arguments["data"])) if "data" in arguments else []
-    return (*folders, *_own(Path(inspect.getfile(call)), call.__module__), *data)
-
-
-@cache
-def _own(file: Path, module: str) -> tuple[Path, ...]:
-    imported = (path for path in with_imports(file, module) if _SCRIPTS in path.parents)
-    return tuple(sorted({file.resolve(), *(p for p in imported if p.stem not in _PAGES)}))
+    data: list[Path] = []
+    if "data" in arguments:
+        data = park_files(folder := Path(arguments["data"]).resolve())
+        arguments["data"] = str(folder)
+    code = (*code_of(call, *packages), *data)
+    return Job(name=name, call=call, arguments=arguments, code=code)
 
 
 def park_files(folder: Path) -> list[Path]:
@@ -139,10 +120,7 @@ def checksums(folder: Path) -> dict[str, str]:
 
 def truth_of(frames: Sequence[Frame]) -> Trajectory:
     """The true poses, in the frame of the first."""
-    world = world_truth(frames)
-    first = se2.inverse(world.poses[0])
-    poses = np.array([se2.compose(first, pose) for pose in world.poses])
-    return Trajectory(stamps_ns=world.stamps_ns, poses=poses)
+    return in_first_frame(world_truth(frames))
 
 
 def follow(system: SlamSystem, frames: Iterable[Frame], name: str) -> Track:

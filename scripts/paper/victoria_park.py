@@ -10,20 +10,32 @@ import numpy as np
 
 from scripts.figures import styled
 from scripts.paper.comparison import TABLE_1, paper_table
-from scripts.paper.map_figures import active, legend_below, map_panels, window_about, window_over
-from scripts.paper.park_landmarks import GATE_M, NEAR_M, landmark_numbers
 from scripts.paper.park_runs import SYSTEMS, read, run_graph, run_one
 from scripts.paper.park_scores import (
     FASTEST,
     FIRST_M,
+    GATE_M,
+    NEAR_M,
     SLACK_M,
     at_fixes,
     first_fit,
     good_fixes,
     headings_off,
+    landmark_numbers,
     pose_numbers,
 )
-from scripts.paper.report import COLORS, Report, draw_activities, draw_ellipses, error_axes
+from scripts.paper.report import (
+    COLORS,
+    Report,
+    active,
+    draw_activities,
+    draw_ellipses,
+    error_axes,
+    legend_below,
+    map_panels,
+    window_about,
+    window_over,
+)
 from scripts.paper.runs import Plan, Run, job
 from slam import se2
 from slam.errors import InvalidValueError

@@ -14,7 +14,7 @@ from scripts.comparison.plan import Run
 from scripts.comparison.schema import LATER, settings
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
 from scripts.pages.page import Cell, Table, template
-from scripts.report import answer, closed, curves, pictures, score_tables, style, tables, words
+from scripts.report import answer, curves, pictures, score_tables, style, tables, words
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
 from slam.files import write_text
@@ -38,7 +38,7 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
     return template("page.html", Path(__file__).parent).render(
         study=study,
         marks={slam: (style.glyph(slam, slams), style.color(slam, slams)) for slam in slams},
-        drives=[(drive, curves.of_drive(drive, slams), closed.table(drive)) for drive in drives],
+        drives=[(drive, curves.of_drive(drive, slams), tables.of_drive(drive)) for drive in drives],
         settings=study.compared.settings,
         answers=answers(study),
         controls=_controls(study),

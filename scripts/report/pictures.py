@@ -17,7 +17,8 @@ from matplotlib.transforms import Affine2D
 
 from scenes.kinds import is_door
 from scripts.comparison.run_file import RunFile
-from scripts.figures import error_series, in_first_frame, log_axis
+from scripts.figures import error_series, log_axis
+from scripts.metrics.judged import in_first_frame
 from scripts.report import style
 from slam import se2
 from slam.evaluation.lost import LOST_M

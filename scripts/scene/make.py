@@ -20,6 +20,7 @@ from slam.files import replacing
 from slam.frontend.seen_space import SeenSpace
 from slam.logs.open import open_log
 from slam.maps import read_map
+from slam.rasters import trimmed
 from slam.replay import Replay
 
 SWEEPS = 4000  # scans of a log, at most, by which it is known what floor is free
@@ -82,14 +83,13 @@ def of_log(path: Path, slam: str, *, strict: bool) -> tuple[Raster, NDArray[np.f
     poses = np.array([estimate.T_map_robot for estimate in track.estimates])
     final = track.final()
     poses = poses if final is None else final.poses
-    cells = track.map_strips()
+    cells = track.map()
     if cells is None or not len(poses):
         raise InvalidValueError(f"{path.name}: '{slam}' makes no map of cells of it")
     seen = SeenSpace()
     for k, scan in scans:
         seen.add(scan, poses[min(k, len(poses) - 1)])
-    part = cells.trimmed() or cells
-    return seen.merge(part).whole(), poses
+    return seen.merge(trimmed(cells) or cells), poses
 
 
 def in_words(drawn: MapPlan) -> Iterator[str]:

@@ -27,12 +27,13 @@ from scripts.film.render import Liveliest, shoot, watched
 from scripts.film.show import Show
 from scripts.live.replay import Recorder
 from scripts.machine import machine
+from scripts.metrics.judged import in_first_frame
 from scripts.names import file_name
 from scripts.output import whole_folder, write_recipe
 from scripts.pages import page as pages
 from scripts.pages.page import Page, Part, command
 from scripts.single_run import score
-from scripts.single_run.small_maps import Drawn, drawn, for_file
+from scripts.single_run.score import Drawn, drawn, for_file
 from sim.view.draw import Picture
 from slam.errors import InvalidValueError
 from slam.evaluation.consistency import KeptScans
@@ -180,7 +181,7 @@ def _write_paths(folder: Path, replay: Replay, epoch_ns: int) -> None:
 
 def _truth(replay: Replay) -> Trajectory | None:
     world_truth = replay.truth()
-    return None if world_truth is None else figures.in_first_frame(world_truth)
+    return None if world_truth is None else in_first_frame(world_truth)
 
 
 def _write_map(folder: Path, show: Show) -> Drawn | None:

@@ -14,7 +14,7 @@ from rich.table import Table
 from scripts.console import console, note, say
 from scripts.names import check
 from scripts.options import Cluster, Jobs, PlanOnly, Set, named
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, MissingPathError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
@@ -105,6 +105,9 @@ def benchmark(
     from scripts.comparison.plan import ahead
 
     workers.check_jobs(jobs)
+    for path in merge or ():
+        if not path.exists():
+            raise MissingPathError(path, "no such file")
     shared = [path for path in merge or () if published.is_one(path)]
     others = [submission.read(path) for path in merge or () if path not in shared]
     ship = published.read(shared[-1] if shared else published.FILE)

@@ -8,22 +8,10 @@ from typing import TYPE_CHECKING, Annotated, Any
 
 import typer
 
+from scripts import options
 from scripts.console import console, say
 from scripts.debugger.question import Question
 from scripts.names import check, file_name, run_name
-from scripts.options import (
-    Change,
-    CrowdOption,
-    DynamismLevel,
-    Held,
-    Motion,
-    Overwrite,
-    Scanner,
-    Seconds,
-    Seed,
-    Trust,
-    named,
-)
 from slam.errors import InvalidValueError
 from slam.evaluation.lost import Rule
 
@@ -43,13 +31,13 @@ def blame(
         str | None, typer.Option(help="SLAM to examine; default the run's first, or shunting.")
     ] = None,
     scene: Annotated[str | None, typer.Option(help="Instead of RUN: a scene to simulate.")] = None,
-    dynamism: DynamismLevel = 0.5,
-    motion: Motion = None,
-    change: Change = None,
-    crowd: CrowdOption = None,
-    seed: Seed = 0,
-    seconds: Seconds = 60.0,
-    scanner: Scanner = "full",
+    dynamism: options.DynamismLevel = 0.5,
+    motion: options.Motion = None,
+    change: options.Change = None,
+    crowd: options.CrowdOption = None,
+    seed: options.Seed = 0,
+    seconds: options.Seconds = 60.0,
+    scanner: options.Scanner = "full",
     option: Annotated[
         list[str] | None, typer.Option(help="Option of the scene: NAME=VALUE, e.g. n_chairs=6.")
     ] = None,
@@ -80,8 +68,8 @@ def blame(
         int, typer.Option(help="Repeats of original and cure with other noise.")
     ] = Question.repeats,
     out: Annotated[Path | None, typer.Option(help="Folder; default out/blame-...")] = None,
-    overwrite: Overwrite = False,
-    trust: Trust = False,
+    overwrite: options.Overwrite = False,
+    trust: options.Trust = False,
 ) -> None:
     """Find which mover misled a SLAM, by running the world again without it.
 
@@ -98,7 +86,7 @@ def blame(
         raise InvalidValueError("name exactly one of RUN and --scene")
     question = Question(
         rule=Rule(threshold_m=threshold, within_s=within), at_s=at, lead_s=lead,
-        horizon_s=horizon, top=top, repeats=repeats, who=named(who or []),
+        horizon_s=horizon, top=top, repeats=repeats, who=options.named(who or []),
     )  # fmt: skip
     check([slam] if slam else [], scene)
     from scripts.debugger.episode import Case, case_of
@@ -107,7 +95,7 @@ def blame(
     if run is not None:
         case, name = case_of(run, slam, every, trust), run_name(run)
     else:
-        held = Held(motion=motion, change=change, crowd=crowd)
+        held = options.Held(motion=motion, change=change, crowd=crowd)
         world = held.world(scene, dynamism, seed)
         settings, name = _world(world, option or [], scanner), f"{scene}-{seed}"
         case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
@@ -117,13 +105,13 @@ def blame(
     _tell(carry_out(case, question, folder, overwrite=overwrite), folder, run)
 
 
-def _world(world: dict[str, Any], options: list[str], scanner: str) -> dict[str, Any]:
+def _world(world: dict[str, Any], words: list[str], scanner: str) -> dict[str, Any]:
     """Settings of the simulation: scene, dynamism and seed, and what the options say."""
     from scripts.debugger.episode import options_of
     from sim.sensors.lidar.registry import scanner_of
 
     laser = scanner_of(scanner)
-    settings = {**world, **options_of(options)}
+    settings = {**world, **options_of(words)}
     return settings if scanner == "full" else settings | {"laser": laser}
 
 

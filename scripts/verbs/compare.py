@@ -10,25 +10,9 @@ from typing import TYPE_CHECKING, Annotated, Any
 import typer
 from rich.markup import escape
 
+from scripts import options
 from scripts.console import console, fact, say
 from scripts.names import check
-from scripts.options import (
-    ChangeLevels,
-    Cluster,
-    CrowdOption,
-    Jobs,
-    MotionLevels,
-    Oracles,
-    PeopleLevels,
-    PlanOnly,
-    Scanner,
-    Set,
-    axis_levels,
-    every_of,
-    named,
-    whole,
-    with_oracles,
-)
 from slam.guests import Limits
 
 if TYPE_CHECKING:
@@ -40,15 +24,15 @@ def compare(
         list[str], typer.Option(help="SLAMs, by name, module:Class or pipe:COMMAND: --slam A B C.")
     ],
     out: Annotated[Path, typer.Option(help="Folder of the comparison.")],
-    oracle: Oracles = None,
+    oracle: options.Oracles = None,
     scene: Annotated[list[str] | None, typer.Option(help="Scenes; default arena office.")] = None,
     dynamism: Annotated[
         list[str] | None, typer.Option(help="Levels, as start:stop:step or one by one.")
     ] = None,
-    motion: MotionLevels = None,
-    change: ChangeLevels = None,
-    people: PeopleLevels = None,
-    crowd: CrowdOption = None,
+    motion: options.MotionLevels = None,
+    change: options.ChangeLevels = None,
+    people: options.PeopleLevels = None,
+    crowd: options.CrowdOption = None,
     seeds: Annotated[int, typer.Option(help="Seeds at every level, the same at each.")] = 10,
     first_seed: Annotated[
         int, typer.Option(help="The first of them; the SLAMs here were tuned on 0 to 19.")
@@ -57,7 +41,7 @@ def compare(
     every: Annotated[
         int | None, typer.Option(help="Use one scan in N; default about 4.7 a second.")
     ] = None,
-    scanner: Scanner = "full",
+    scanner: options.Scanner = "full",
     sessions: Annotated[
         int | None,
         typer.Option(
@@ -69,10 +53,10 @@ def compare(
     scan_limit: Annotated[
         float, typer.Option(help="Time limit of a scan for a SLAM from outside, s.")
     ] = Limits.scan_s,
-    jobs: Jobs = 1,
-    cluster: Cluster = None,
-    plan_only: PlanOnly = False,
-    set_: Set = None,
+    jobs: options.Jobs = 1,
+    cluster: options.Cluster = None,
+    plan_only: options.PlanOnly = False,
+    set_: options.Set = None,
 ) -> None:
     """Run SLAMs on the same simulated runs; write tables of error against dynamism.
 
@@ -85,16 +69,16 @@ def compare(
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
     --out out/compare[/bold]
     """
-    whole("--seeds", seeds, 1, 10_000)
-    slams = with_oracles(named(slam), oracle, set_)
-    rooms = named(scene or ["arena", "office"])
+    options.whole("--seeds", seeds, 1, 10_000)
+    slams = options.with_oracles(options.named(slam), oracle, set_)
+    rooms = options.named(scene or ["arena", "office"])
     check(slams, *rooms)
     from scripts import pace, workers
     from scripts.comparison.make import carry_out
     from scripts.comparison.plan import Plan, ahead
 
     workers.check_jobs(jobs)
-    axis, at, held = axis_levels(dynamism, motion, change, people)
+    axis, at, held = options.axis_levels(dynamism, motion, change, people)
     plan = Plan(
         slams=slams,
         scenes=rooms,
@@ -104,7 +88,7 @@ def compare(
         crowd=crowd,
         seeds=tuple(range(first_seed, first_seed + seeds)),
         seconds=seconds,
-        every=every_of(scanner, every, 8),
+        every=options.every_of(scanner, every, 8),
         scanner=scanner,
         scan_limit_s=scan_limit,
         sessions=sessions,

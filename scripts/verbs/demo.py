@@ -8,20 +8,8 @@ from typing import Annotated
 
 import typer
 
+from scripts import options
 from scripts.names import check
-from scripts.options import (
-    Change,
-    CrowdOption,
-    DynamismLevel,
-    Held,
-    Motion,
-    Overwrite,
-    PlanOnly,
-    ScanHeight,
-    Scanner,
-    Seconds,
-    Seed,
-)
 
 FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
 
@@ -29,17 +17,17 @@ FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
 def demo(
     out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("out/demo"),
     scene: Annotated[str, typer.Option(help="Scene to drive in.")] = "office",
-    seconds: Seconds = 60.0,
-    dynamism: DynamismLevel = 0.5,
-    motion: Motion = None,
-    change: Change = 0.0,
-    crowd: CrowdOption = "none",
-    seed: Seed = 2,
-    scan_height: ScanHeight = 0.36,
-    scanner: Scanner = "full",
-    overwrite: Overwrite = False,
+    seconds: options.Seconds = 60.0,
+    dynamism: options.DynamismLevel = 0.5,
+    motion: options.Motion = None,
+    change: options.Change = 0.0,
+    crowd: options.CrowdOption = "none",
+    seed: options.Seed = 2,
+    scan_height: options.ScanHeight = 0.36,
+    scanner: options.Scanner = "full",
+    overwrite: options.Overwrite = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
-    plan_only: PlanOnly = False,
+    plan_only: options.PlanOnly = False,
 ) -> None:
     """Drive a robot through a moving office, and compare SLAM with odometry.
 
@@ -55,7 +43,7 @@ def demo(
     from scripts.single_run.session import Outputs
 
     outputs = Outputs(folder=out, command="demo", overwrite=overwrite, film=film, film_fps=FILM_FPS)
-    held = Held(motion=motion, change=change, crowd=crowd)
+    held = options.Held(motion=motion, change=change, crowd=crowd)
     settings = held.world(scene, dynamism, seed) | {
         "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
     }  # fmt: skip

@@ -11,21 +11,9 @@ from typing import Annotated
 import typer
 from rich.markup import escape
 
+from scripts import options
 from scripts.console import console, say
 from scripts.names import check
-from scripts.options import (
-    ChangeLevels,
-    CrowdOption,
-    Jobs,
-    MotionLevels,
-    PlanOnly,
-    Scanner,
-    Set,
-    axis_levels,
-    every_of,
-    named,
-    whole,
-)
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
@@ -37,9 +25,9 @@ def drive(
     dynamism: Annotated[
         list[str] | None, typer.Option(help="Levels, start:stop:step or one by one; 0:1:0.25.")
     ] = None,
-    motion: MotionLevels = None,
-    change: ChangeLevels = None,
-    crowd: CrowdOption = None,
+    motion: options.MotionLevels = None,
+    change: options.ChangeLevels = None,
+    crowd: options.CrowdOption = None,
     seeds: Annotated[
         list[str] | None, typer.Option(help="How many seeds, from 100 on; or several seeds.")
     ] = None,
@@ -53,10 +41,10 @@ def drive(
     every: Annotated[
         int | None, typer.Option(help="Use one scan in N; default about 9.4 a second.")
     ] = None,
-    scanner: Scanner = "full",
-    jobs: Jobs = 1,
-    plan_only: PlanOnly = False,
-    set_: Set = None,
+    scanner: options.Scanner = "full",
+    jobs: options.Jobs = 1,
+    plan_only: options.PlanOnly = False,
+    set_: options.Set = None,
 ) -> None:
     """Drive to a goal in every room, steered by each SLAM's estimate; truth only scores.
 
@@ -65,7 +53,7 @@ def drive(
     [bold]mobilia drive arena --slam shunting odometry --dynamism 0:1:0.5 --seeds 3 --out
     out/drive[/bold]
     """
-    slams = with_set(named(slam), set_ or [])
+    slams = with_set(options.named(slam), set_ or [])
     check(slams, scene)
     from scripts import pace, workers
     from scripts.closed_loop.make import carry_out, said, success_table
@@ -74,7 +62,8 @@ def drive(
     from sim.loop.config import LoopConfig
 
     workers.check_jobs(jobs)
-    axis, at, held = axis_levels(dynamism, motion, change)
+    axis, at, held = options.axis_levels(dynamism, motion, change)
+    scans = options.every_of(scanner, every, 4)
     plan = Plan(
         scene=scene,
         slams=slams,
@@ -82,9 +71,9 @@ def drive(
         levels=at,
         **held,
         crowd=crowd,
-        seeds=_seeds(named(seeds or ["5"])),
-        goals=_goals(named(goals or [])),
-        loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=every_of(scanner, every, 4)),
+        seeds=_seeds(options.named(seeds or ["5"])),
+        goals=_goals(options.named(goals or [])),
+        loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=scans),
         scanner=scanner,
     )
     missing = [job for _, job in plan.jobs() if not (out / RUNS / job.file_name()).exists()]
@@ -124,7 +113,7 @@ def _seeds(words: tuple[str, ...]) -> tuple[int, ...]:
             f"--seeds must be a number, several, or first:end, got {' '.join(words)!r}"
         ) from None
     if len(numbers) == 1:
-        whole("--seeds", numbers[0], 1, 10_000)
+        options.whole("--seeds", numbers[0], 1, 10_000)
         return tuple(range(100, 100 + numbers[0]))
     return numbers
 

@@ -10,25 +10,9 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from scenes import registry
+from scripts import options
 from scripts.console import console
 from scripts.names import check
-from scripts.options import (
-    Change,
-    Cluster,
-    CrowdOption,
-    EventsOption,
-    Held,
-    Jobs,
-    Motion,
-    PlanOnly,
-    RobotOption,
-    Scanner,
-    named,
-    options_with,
-    staged,
-    sweep,
-)
-from scripts.options import levels as levels_of
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -54,9 +38,9 @@ def generate(
         ),
     ] = None,
     dynamism_sweep: Annotated[str, typer.Option(help="The same.", hidden=True)] = "",
-    motion: Motion = None,
-    change: Change = None,
-    crowd: CrowdOption = None,
+    motion: options.Motion = None,
+    change: options.Change = None,
+    crowd: options.CrowdOption = None,
     episodes: Annotated[
         int | None, typer.Option(help="Episodes (in each scene, at each dynamism); default 1.")
     ] = None,
@@ -77,12 +61,12 @@ def generate(
     sessions: Annotated[
         int, typer.Option(help="So many sessions of one building instead, --change apart.")
     ] = 0,
-    jobs: Jobs = 1,
-    cluster: Cluster = None,
-    scanner: Scanner = "full",
-    events: EventsOption = None,
-    robot: RobotOption = None,
-    plan_only: PlanOnly = False,
+    jobs: options.Jobs = 1,
+    cluster: options.Cluster = None,
+    scanner: options.Scanner = "full",
+    events: options.EventsOption = None,
+    robot: options.RobotOption = None,
+    plan_only: options.PlanOnly = False,
 ) -> None:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
 
@@ -93,8 +77,8 @@ def generate(
 
     [bold]mobilia generate office arena --split train:8,validation:1,test:1 --out data[/bold]
     """
-    levels = sweep(dynamism_sweep) if dynamism_sweep else levels_of(dynamism or ["0.5"])
-    rooms = named(scene)
+    levels = options.levels([dynamism_sweep] if dynamism_sweep else dynamism or ["0.5"])
+    rooms = options.named(scene)
     check([], *rooms)
     from scripts import pace, workers
     from scripts.dataset import carry_out
@@ -105,11 +89,11 @@ def generate(
     if split and episodes is not None:
         raise InvalidValueError("--split says how many episodes there are: leave --episodes out")
     parts = split_of(split)
-    Held(motion=motion, change=change, crowd=crowd)  # complains by the options' names
+    options.Held(motion=motion, change=change, crowd=crowd)  # complains by the options' names
     first = Recipe(
         scene=rooms[0], seed=seed, dynamism=levels[0], motion=motion, change=change,
-        seconds=seconds, scanner=scanner, options=options_with(crowd),
-        **staged(events, robot),
+        seconds=seconds, scanner=scanner, options=options.options_with(crowd),
+        **options.staged(events, robot),
     )  # fmt: skip
     plan = Plan(
         recipe=first, dynamisms=levels, twins=twins, sessions=sessions, split=parts,

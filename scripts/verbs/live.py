@@ -10,21 +10,10 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 from rich.markup import escape
 
+from scripts import options
 from scripts.console import note, say
 from scripts.live import FASTEST, SLOWEST
 from scripts.names import check
-from scripts.options import (
-    Change,
-    CrowdOption,
-    DynamismLevel,
-    EventsOption,
-    Held,
-    Motion,
-    RobotOption,
-    Scanner,
-    Set,
-    staged,
-)
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
@@ -46,14 +35,14 @@ def live(
     log: Annotated[Path | None, typer.Option(help="Instead of a scene: a log.")] = None,
     bag: Annotated[Path | None, typer.Option(help="Instead of a scene: a bag of ROS.")] = None,
     seconds: Annotated[float, typer.Option(help="How long the scene lives, s.")] = 3600.0,
-    dynamism: DynamismLevel = 0.5,
-    motion: Motion = None,
-    change: Change = None,
-    crowd: CrowdOption = None,
-    events: EventsOption = None,
-    robot: RobotOption = None,
+    dynamism: options.DynamismLevel = 0.5,
+    motion: options.Motion = None,
+    change: options.Change = None,
+    crowd: options.CrowdOption = None,
+    events: options.EventsOption = None,
+    robot: options.RobotOption = None,
     seed: Annotated[int, typer.Option(help="Seed of the scene, whole number >= 0.")] = 0,
-    scanner: Scanner = "full",
+    scanner: options.Scanner = "full",
     paused: Annotated[bool, typer.Option("--paused", help="Wait for play.")] = False,
     speed: Annotated[float, typer.Option(help="1 is real time.")] = 1.0,
     host: Annotated[
@@ -71,7 +60,7 @@ def live(
         str | None,
         typer.Option(help="The robot on a network of ROS 2 as well: dds or zenoh (docs/ros2.md)."),
     ] = None,
-    set_: Set = None,
+    set_: options.Set = None,
 ) -> None:
     """Open a page with a running world: watch it, drive in it, push its chairs.
 
@@ -92,8 +81,8 @@ def live(
 
     allowed = [gate.origin_of(text) for text in allow_origin or []]
     served.require()
-    held = Held(motion=motion, change=change, crowd=crowd)
-    world = {**held.world(scene, dynamism, seed), "laser": scanner, **staged(events, robot)}
+    held = options.Held(motion=motion, change=change, crowd=crowd)
+    world = {**held.world(scene, dynamism, seed), "laser": scanner, **options.staged(events, robot)}
     opener = session.Opener(
         slams=slams, path=path, settings=world if path is None else {}, seconds=seconds
     )

@@ -64,7 +64,7 @@ def report(
 def _replays(about: Study) -> list[str]:
     """Pages of the subject's worst run in each scene, made again from its recipe."""
     from scripts.comparison.plan import Run
-    from scripts.film.footage import of_compared
+    from scripts.film.footage import open_run
     from scripts.film.render import shoot
     from scripts.live.replay import Recorder
 
@@ -75,7 +75,7 @@ def _replays(about: Study) -> list[str]:
         path = about.compared.folder / "runs" / f"{run.name}.npz"
         out = about.compared.folder / "replays" / f"{path.stem}.html"
         out.parent.mkdir(exist_ok=True)
-        with of_compared(path, view=None) as footage:
+        with open_run(path, view=None) as footage:
             show = footage.show([about.subject])
             with Recorder.of(out, show) as recorder:
                 for _ in shoot(footage.stream, show, None):

@@ -8,31 +8,8 @@ from typing import Annotated
 
 import typer
 
+from scripts import options
 from scripts.names import check, run_name, scene_name
-from scripts.options import (
-    Change,
-    CrowdOption,
-    DynamismLevel,
-    EventsOption,
-    Flip,
-    Held,
-    Laser,
-    Motion,
-    Oracles,
-    Overwrite,
-    PlanOnly,
-    RobotOption,
-    ScanHeight,
-    Scanner,
-    Seconds,
-    Seed,
-    Set,
-    Strict,
-    TextFormat,
-    named,
-    staged,
-    with_oracles,
-)
 from slam.errors import InvalidValueError
 from slam.variants import MAP_ORACLE
 
@@ -53,29 +30,29 @@ def run(
             ".rawlog, the folder of Victoria Park; or any text log with --format."
         ),
     ] = None,
-    text_format: TextFormat = None,
-    laser: Laser = None,
-    flip: Flip = False,
-    strict: Strict = False,
+    text_format: options.TextFormat = None,
+    laser: options.Laser = None,
+    flip: options.Flip = False,
+    strict: options.Strict = False,
     scene: Annotated[
         str | None, typer.Option(help="Or a simulated scene, driven on a tour of its rooms.")
     ] = None,
-    seconds: Seconds = 60.0,
-    dynamism: DynamismLevel = 0.5,
-    motion: Motion = None,
-    change: Change = None,
-    crowd: CrowdOption = None,
-    events: EventsOption = None,
-    robot: RobotOption = None,
-    seed: Seed = 0,
-    scan_height: ScanHeight = 0.36,
-    scanner: Scanner = "full",
+    seconds: options.Seconds = 60.0,
+    dynamism: options.DynamismLevel = 0.5,
+    motion: options.Motion = None,
+    change: options.Change = None,
+    crowd: options.CrowdOption = None,
+    events: options.EventsOption = None,
+    robot: options.RobotOption = None,
+    seed: options.Seed = 0,
+    scan_height: options.ScanHeight = 0.36,
+    scanner: options.Scanner = "full",
     out: Annotated[
         Path | None, typer.Option(help="Folder to write; default out/run-<log or scene>.")
     ] = None,
-    overwrite: Overwrite = False,
+    overwrite: options.Overwrite = False,
     film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
-    plan_only: PlanOnly = False,
+    plan_only: options.PlanOnly = False,
     map_in: Annotated[
         Path | None,
         typer.Option(help="Begin anywhere in this map of days before (docs/days.md); with --log."),
@@ -87,8 +64,8 @@ def run(
         str | None,
         typer.Option(help="When the session began, 2026-05-04T09:00; default the log's clock."),
     ] = None,
-    oracle: Oracles = None,
-    set_: Set = None,
+    oracle: options.Oracles = None,
+    set_: options.Set = None,
 ) -> None:
     """Run SLAMs on a log or on a simulated scene and write the same files as the demo.
 
@@ -98,7 +75,7 @@ def run(
     """
     if (log is None) == (scene is None):
         raise InvalidValueError("name exactly one of --log and --scene")
-    slams = list(with_oracles(named(list(slam)), oracle, set_))
+    slams = list(options.with_oracles(options.named(list(slam)), oracle, set_))
     if MAP_ORACLE in slams:
         raise InvalidValueError("--oracle map is for compare and benchmark: they know the true map")
     check(slams, scene)
@@ -112,10 +89,10 @@ def run(
 
         folder = out or Path("out") / f"run-{scene_name(scene)}"
         outputs = Outputs(folder=folder, command="run", overwrite=overwrite, film=film)
-        held = Held(motion=motion, change=change, crowd=crowd)
+        held = options.Held(motion=motion, change=change, crowd=crowd)
         settings = held.world(scene, dynamism, seed) | {
             "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
-            **staged(events, robot),
+            **options.staged(events, robot),
         }  # fmt: skip
         work = on_scene_work(slams, seconds, film)
         announce(f"{seconds:g} s of {scene}" + ", filmed" * film, [work])

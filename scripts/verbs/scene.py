@@ -148,8 +148,8 @@ def kinds(
 
     [bold]mobilia scene kinds --out kinds.png[/bold]
     """
-    from scripts.scene.kinds import kinds as known
-    from scripts.scene.kinds import picture
+    from scripts.scene.picture import kinds as known
+    from scripts.scene.picture import picture
 
     stands, moves = known()
     say(f"stands: {', '.join(stands)}", highlight=False)

@@ -73,7 +73,7 @@ def beside_log(
 ) -> None:
     """Print the two cards side by side; with ``out``, also write them as real_scanner_log.md."""
     from scripts.card import beside, page
-    from scripts.card.real import like, real_card, simulated_card
+    from scripts.card.beside import like, real_card, simulated_card
     from sim.sensors.lidar.registry import scanner_of
 
     scanner_of(scanner)  # an unknown name is said before anything is read

@@ -57,7 +57,7 @@ def twin(
     folder = out or Path("out") / f"twin-{run_name(log)}"
     if (folder / "twin.json").exists() and not overwrite:
         raise InvalidValueError(f"{folder} has a twin already: --overwrite replaces it")
-    from scripts.log_twin import make, picture
+    from scripts.log_twin import make
     from slam.files import write_text
     from slam.logs import write_carmen
 
@@ -72,7 +72,7 @@ def twin(
     words = json.dumps({"log": log.name, **made.words}, indent=1)
     write_text(folder / "twin.json", words + "\n")
     title = f"{run_name(log)}: the twin's returns beside the log's"
-    picture.differences(folder / "differences.png", made.beside, read.poses, title)
+    make.differences(folder / "differences.png", made.beside, read.poses, title)
     table = plain_table(f"{log.name} and its twin", caption=f"poses: {read.whose}")
     for heading in ("beams on what", *SHOWN):
         table.add_column(heading.replace("_", " "), justify="right")

@@ -31,7 +31,7 @@ from sim.actors.rolling import Rolling, inertia_of
 from sim.core.draws import between, waiting
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
-from slam._jit import njit
+from slam._jit import uncounted
 from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
@@ -57,7 +57,7 @@ class Shoved(NamedTuple):
     dofs: NDArray[np.int64]
 
 
-@njit
+@uncounted
 def shove(time: float, tick: float, shoved: Shoved, qfrc: Float) -> None:
     """Start and end shoves due at ``time`` s by writing generalised forces into ``qfrc``."""
     rates, counters, schedule = shoved.rates, shoved.counters, shoved.schedule

@@ -83,16 +83,6 @@ def numbers(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
     return out
 
 
-def check_not_negative(config: Any) -> None:
-    """``InvalidValueError`` for a field of that dataclass that is negative or not finite."""
-    for item in fields(config):
-        value = getattr(config, item.name)
-        if not (math.isfinite(value) and value >= 0.0):
-            raise InvalidValueError(
-                f"{type(config).__name__}.{item.name} must be finite and >= 0, got {value}"
-            )
-
-
 def check_within(config: Any, limits: Mapping[str, tuple[float, float]]) -> None:
     """``InvalidValueError`` for a field of that dataclass below its least or above its most."""
     for name, (least, most) in limits.items():

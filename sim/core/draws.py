@@ -12,14 +12,14 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import uncounted
 
 _GAMMA = np.uint64(0x9E3779B97F4A7C15)
 _MIX1 = np.uint64(0xBF58476D1CE4E5B9)
 _MIX2 = np.uint64(0x94D049BB133111EB)
 
 
-@njit
+@uncounted
 def uniform(counters: NDArray[np.uint64], i: int) -> float:
     """A number in [0, 1) with 53 random bits from generator ``i``, which moves on by one."""
     counters[i] = counters[i] + _GAMMA
@@ -30,13 +30,13 @@ def uniform(counters: NDArray[np.uint64], i: int) -> float:
     return float(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
 
 
-@njit
+@uncounted
 def between(counters: NDArray[np.uint64], i: int, low: float, high: float) -> float:
     """Uniform in [low, high)."""
     return low + (high - low) * uniform(counters, i)
 
 
-@njit
+@uncounted
 def waiting(counters: NDArray[np.uint64], i: int, rate: float) -> float:
     """Time to the next event of a Poisson process, s; infinite at rate 0. Always one draw."""
     u = 1.0 - uniform(counters, i)
@@ -45,7 +45,7 @@ def waiting(counters: NDArray[np.uint64], i: int, rate: float) -> float:
     return -math.log(u) / rate
 
 
-@njit
+@uncounted
 def normal(counters: NDArray[np.uint64], i: int) -> float:
     """Standard normal (Box and Muller); always two draws."""
     u = 1.0 - uniform(counters, i)

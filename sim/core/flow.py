@@ -17,14 +17,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner, njit, uncounted
 
 Float = NDArray[np.float64]
 FAR = 1e6  # s/(m/s), travel time of a node with no way to the goal
 WALL = 0.06  # m, nodes nearer than this to a box are solid; twice this is more than a cell
 
 
-@njit
+@uncounted
 def box_clearance(x: float, y: float, boxes: Float) -> float:
     """m from (x, y) to the nearest box (cx, cy, half x, half y, yaw); negative inside one."""
     nearest = math.inf
@@ -181,7 +181,7 @@ def nowhere() -> Field:
     return Field(np.zeros((0, 0)), np.zeros((0, 0, 0)), np.zeros((0, 0, 0, 0)), 0.0, 0.0, 1.0)
 
 
-@njit
+@uncounted
 def clearance_at(field: Field, x: float, y: float) -> float:
     """Clearance by bilinear interpolation, m; outside the floor -1."""
     clearance, cell = field.clearance, field.cell
@@ -195,7 +195,7 @@ def clearance_at(field: Field, x: float, y: float) -> float:
     return float(low * (1.0 - a) + high * a)
 
 
-@njit
+@uncounted
 def time_at(field: Field, goal: int, x: float, y: float) -> float:
     """Travel time to a goal (s at 1 m/s), the least of the four nodes around plus the way there."""
     times, cell = field.times, field.cell
@@ -209,7 +209,7 @@ def time_at(field: Field, goal: int, x: float, y: float) -> float:
     return least
 
 
-@njit
+@uncounted
 def way_at(field: Field, goal: int, x: float, y: float) -> tuple[float, float]:
     """Unit direction to walk in, (0, 0) outside the floor."""
     ways, cell = field.ways, field.cell

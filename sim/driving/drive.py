@@ -16,11 +16,11 @@ from numpy.typing import NDArray
 
 from sim.actors.config import ACTORS
 from sim.actors.robot import steered
-from sim.core.checks import check_types
 from sim.driving.navgrid import NavGrid
 from slam._jit import inner, njit
 from slam.errors import InvalidValueError
 from slam.frames import Float
+from slam.settings import Settings, number
 
 _FAR = 1e6
 _D = ACTORS.driver
@@ -32,29 +32,15 @@ _TURNING, _REVERSE, _STANDING = _D.turning, _D.reverse, _D.standing
 
 
 @dataclass(frozen=True, kw_only=True)
-class TourConfig:
-    """Limits of a tour.
+class TourConfig(Settings):
+    """Limits of a tour: an indoor Pioneer's usual pace, not its maximum."""
 
-    v_max_mps, omega_max_radps  speed limits; an indoor Pioneer's usual pace, not its maximum
-    robot_radius_m              clearance kept to walls and discs (Pioneer 3-DX: 0.26 m + margin)
-    goal_radius_m               a goal counts as visited within this distance
-    patience_s                  without progress for this long, the next goal is tried
-    turn_radius_m               of the tightest turn of a car; 0: it turns on the spot
-    """
-
-    v_max_mps: float = 0.7
-    omega_max_radps: float = 1.4
-    robot_radius_m: float = 0.285
-    goal_radius_m: float = 0.5
-    patience_s: float = 6.0
-    turn_radius_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_types(self)
-        for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            if not (value > 0.0 or (value == 0.0 and name == "turn_radius_m")):
-                raise InvalidValueError(f"TourConfig.{name} must be > 0, got {getattr(self, name)}")
+    v_max_mps: float = number(0.7, "m/s", "driving, at most", low=1e-6)
+    omega_max_radps: float = number(1.4, "rad/s", "turning, at most", low=1e-6)
+    robot_radius_m: float = number(0.285, "m", "kept to walls and discs: 0.26 of a 3-DX", low=1e-6)
+    goal_radius_m: float = number(0.5, "m", "from a goal that counts as visited", low=1e-6)
+    patience_s: float = number(6.0, "s", "without progress: the next goal is tried", low=1e-6)
+    turn_radius_m: float = number(0.0, "m", "of a car's tightest turn; 0: it turns on the spot")
 
 
 @inner

@@ -7,13 +7,15 @@ stacks what these give.
 
 from __future__ import annotations
 
+from collections.abc import Callable
 from typing import Any
 
 import gymnasium
 import numpy as np
 from gymnasium import spaces
-from gymnasium.vector import VectorEnv, VectorObservationWrapper
-from gymnasium.vector.utils import batch_space
+from gymnasium.vector import VectorEnv
+from gymnasium.wrappers import TransformObservation
+from gymnasium.wrappers.vector import TransformObservation as OfMany
 from numpy.typing import NDArray
 
 from sim.core.checks import number, whole
@@ -40,113 +42,67 @@ def pooled(ranges: NDArray[Any], n_sectors: int) -> NDArray[Any]:
     return out
 
 
-class _Pooling:
-    """What both wrappers of that name do."""
+def LidarMinPooling(env: Any, n_sectors: int = SECTORS) -> Any:
+    """One room or a vector of them with ``ranges`` (n_sectors,) m, the least of each sector.
 
-    def __init__(self, space: spaces.Space[Any], n_sectors: int) -> None:
-        beams = _entry(space, "ranges", "LidarMinPooling")
-        whole("n_sectors", n_sectors, 1, beams.shape[0])
-        self.n = int(n_sectors)
-        most = float(beams.high.flat[0])
-        kept = {k: v for k, v in space.items() if k != "valid"}  # type: ignore[attr-defined]
-        kept["ranges"] = spaces.Box(0.0, np.float32(most), (self.n,), np.float32)
-        self.space = spaces.Dict(kept)
+    `valid` is left out: a beam without a return counts as the scanner's greatest range. Raises
+    ``InvalidValueError`` for less than one or more sectors than beams, and for an environment
+    without ``ranges``.
+    """
+    space = _space(env)
+    beams = _entry(space, "ranges", "LidarMinPooling")
+    whole("n_sectors", n_sectors, 1, beams.shape[0])
+    n, most = int(n_sectors), np.float32(beams.high.flat[0])
 
-    def __call__(self, seen: Observation) -> Observation:
+    def look(seen: Observation) -> Observation:
         out = {name: value for name, value in seen.items() if name != "valid"}
-        out["ranges"] = pooled(seen["ranges"], self.n)
-        return out
+        return {**out, "ranges": pooled(seen["ranges"], n)}
+
+    kept = {name: one for name, one in space.items() if name != "valid"}
+    kept["ranges"] = spaces.Box(0.0, most, (n,), np.float32)
+    return _seen(env, look, spaces.Dict(kept))
 
 
-class _Vector:
-    """What both wrappers to a vector do."""
+def GoalVector(env: Any, near_m: float = NEAR_M) -> Any:
+    """One room or a vector of them, seen as one ``Box(-1, 1, (n + 3,), float32)`` each.
 
-    def __init__(self, space: spaces.Space[Any], near_m: float) -> None:
-        number("near_m", near_m)
-        if not near_m > 0.0:
-            raise InvalidValueError(f"near_m must be > 0, got {near_m}")
-        n = _entry(space, "ranges", "GoalVector").shape[0]
-        _entry(space, "goal_polar", "GoalVector")
-        self.near_m = float(near_m)
-        low = np.concatenate([np.zeros(n + 1), -np.ones(2)]).astype(np.float32)
-        self.space = spaces.Box(low, np.ones(n + 3, np.float32), (n + 3,), np.float32)
+    Each range over ``near_m``, at most 1; range of the goal over 8 m, at most 1; cosine and sine
+    of its bearing. Raises ``InvalidValueError`` for an environment without ``goal_polar``.
+    """
+    number("near_m", near_m)
+    if not near_m > 0.0:
+        raise InvalidValueError(f"near_m must be > 0, got {near_m}")
+    n = _entry(_space(env), "ranges", "GoalVector").shape[0]
+    _entry(_space(env), "goal_polar", "GoalVector")
 
-    def __call__(self, seen: Observation) -> Floats:
-        beams = np.minimum(seen["ranges"] / self.near_m, 1.0)
+    def look(seen: Observation) -> Floats:
+        beams = np.minimum(seen["ranges"] / float(near_m), 1.0)
         away, bearing = seen["goal_polar"][..., 0], seen["goal_polar"][..., 1]
         goal = [np.minimum(away / GOAL_M, 1.0), np.cos(bearing), np.sin(bearing)]
         out: Floats = np.concatenate([beams, np.stack(goal, axis=-1)], axis=-1).astype(np.float32)
         return out
 
+    low = np.concatenate([np.zeros(n + 1), -np.ones(2)]).astype(np.float32)
+    return _seen(env, look, spaces.Box(low, np.ones(n + 3, np.float32), (n + 3,), np.float32))
 
-def _entry(space: spaces.Space[Any], name: str, who: str) -> spaces.Box:
+
+def _space(env: Any) -> Any:
+    """Of the observations of one room."""
+    return env.single_observation_space if isinstance(env, VectorEnv) else env.observation_space
+
+
+def _seen(env: Any, look: Callable[[Observation], Any], space: spaces.Space[Any]) -> Any:
+    if isinstance(env, VectorEnv):
+        return OfMany(env, look, single_observation_space=space)
+    return TransformObservation(env, look, space)
+
+
+def _entry(space: Any, name: str, who: str) -> spaces.Box:
     if isinstance(space, spaces.Dict) and isinstance(space.get(name), spaces.Box):
         box: spaces.Box = space[name]  # type: ignore[assignment]
         return box
     hint = ": make the environment with a goal" if name == "goal_polar" else ""
     raise InvalidValueError(f"{who} needs observations with an entry '{name}'{hint}, got {space}")
-
-
-class LidarMinPooling(gymnasium.ObservationWrapper[Observation, Any, Observation]):
-    """``ranges`` (n_sectors,) m, the least of each sector; `valid` is left out.
-
-    A beam without a return counts as the scanner's greatest range. Raises ``InvalidValueError`` for
-    less than one or more sectors than beams, and for an environment without ``ranges``.
-    """
-
-    def __init__(self, env: gymnasium.Env[Observation, Any], n_sectors: int = SECTORS) -> None:
-        super().__init__(env)
-        self._pooling = _Pooling(env.observation_space, n_sectors)
-        self.observation_space = self._pooling.space
-
-    def observation(self, observation: Observation) -> Observation:
-        """Of the wrapped environment's ``observation``."""
-        return self._pooling(observation)
-
-
-class GoalVector(gymnasium.ObservationWrapper[Floats, Any, Observation]):
-    """The observation as one ``Box(-1, 1, (n + 3,), float32)``, for a small network.
-
-    Each range over ``near_m``, at most 1; range of the goal over 8 m, at most 1; cosine and sine
-    of its bearing. Raises ``InvalidValueError`` for an environment without ``goal_polar``.
-    """
-
-    def __init__(self, env: gymnasium.Env[Observation, Any], near_m: float = NEAR_M) -> None:
-        super().__init__(env)
-        self._vector = _Vector(env.observation_space, near_m)
-        self.observation_space = self._vector.space
-
-    def observation(self, observation: Observation) -> Floats:
-        """Of the wrapped environment's ``observation``."""
-        return self._vector(observation)
-
-
-class VectorLidarMinPooling(VectorObservationWrapper):
-    """``LidarMinPooling`` of a vector environment."""
-
-    def __init__(self, env: VectorEnv[Any, Any, Any], n_sectors: int = SECTORS) -> None:
-        super().__init__(env)
-        self._pooling = _Pooling(env.single_observation_space, n_sectors)
-        self.single_observation_space = self._pooling.space
-        self.observation_space = batch_space(self._pooling.space, env.num_envs)
-
-    def observations(self, observations: Observation) -> Observation:
-        """Of all rooms."""
-        return self._pooling(observations)
-
-
-class VectorGoalVector(VectorObservationWrapper):
-    """``GoalVector`` of a vector environment: (num_envs, n + 3)."""
-
-    def __init__(self, env: VectorEnv[Any, Any, Any], near_m: float = NEAR_M) -> None:
-        super().__init__(env)
-        self._vector = _Vector(env.single_observation_space, near_m)
-        self.single_observation_space = self._vector.space
-        self.observation_space = batch_space(self._vector.space, env.num_envs)
-
-    def observations(self, observations: Observation) -> Floats:
-        """Of all rooms."""
-        return self._vector(observations)
 
 
 def goal_rooms(
@@ -162,7 +118,8 @@ def goal_rooms(
     rooms: Any = gymnasium.make_vec(
         id_, num_envs=num_envs, vectorization_mode="vector_entry_point", **{**usual, **settings}
     )
-    return VectorGoalVector(VectorLidarMinPooling(rooms, n_sectors))
+    many: VectorEnv[Any, Any, Any] = GoalVector(LidarMinPooling(rooms, n_sectors))
+    return many
 
 
 class DynamismCurriculum(gymnasium.Wrapper[Any, Any, Any, Any]):

@@ -22,9 +22,9 @@ from scenes.arrangement import opens_to
 from scenes.scene import Pose, Scene
 from sim.core.seeds import Seeds
 from sim.recording.recipe import Recipe
-from sim.recording.tables import POSE, pose_words, read_table, table
+from sim.recording.tables import POSE, pose_words, table
 from sim.world.sessions import Arrangement, Days
-from sim.world.times_of_day import MOST_SESSIONS, time_of
+from sim.world.times_of_day import time_of
 from slam.files import write_text
 from slam.maps import write_map
 
@@ -109,19 +109,3 @@ def write_days(folder: Path, recipe: Recipe, sessions: int) -> None:
     write_text(folder / THINGS, table(THING_COLUMNS, rows))
     write_text(folder / CHANGES, table(CHANGE_COLUMNS, _differences(known)))
     write_map(folder / "map", days.scene.static_map)
-
-
-def read_things(folder: Path) -> list[Thing]:
-    """``things.csv`` of a dataset; ``LogFormatError`` for anything else."""
-    found = []
-    known = set[tuple[int, str]]()
-    for row in read_table(folder / THINGS, THING_COLUMNS):
-        session = row.whole(0, MOST_SESSIONS - 1)
-        time, name = row.one_of(1, (time_of(session).name,)), row.word(2)
-        if (session, name) in known:
-            raise row.error(f"session {session} has {name!r} twice")
-        known.add((session, name))
-        found.append(
-            Thing(session=session, time_of_day=time, name=name, kind=row.word(3), pose=row.pose(4))
-        )
-    return found

@@ -19,45 +19,32 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.core import state
-from sim.core.checks import check_not_negative, check_types
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float
+from slam.settings import Settings, number
 
 SEEN_GROUPS = np.array([1, 1, 1, 0, 0, 0], dtype=np.uint8)  # no hulls, marks or painted shadows
 HORIZON = 64  # readings kept
 
 
 @dataclass(frozen=True, kw_only=True)
-class TagCameraConfig:
-    """How good the cameras are.
+class TagCameraConfig(Settings):
+    """How good the cameras are."""
 
-    rate_hz        pictures per second, all cameras at once
-    latency_s      from picture to reading
-    noise_std_m    of x and of y, independent from picture to picture; noise_std_rad of the yaw
-    bias_std_m     of x and of y, constant for each camera: its calibration
-    spacing_m      between cameras, in a grid over the floor; height_m above it
-    reach_m        along the floor, how far from beneath a camera it still sees
-    tag_height_m   of the tags above the floor; tag_side_m of the square whose corners must be seen
-    """
-
-    rate_hz: float = 30.0
-    latency_s: float = 0.05
-    noise_std_m: float = 0.01
-    noise_std_rad: float = math.radians(0.5)
-    bias_std_m: float = 0.005
-    spacing_m: float = 3.0
-    height_m: float = 2.7
-    reach_m: float = 2.5
-    tag_height_m: float = 0.52
-    tag_side_m: float = 0.24
+    rate_hz: float = number(30.0, "1/s", "pictures, all cameras at once", low=1e-6)
+    latency_s: float = number(0.05, "s", "from picture to reading")
+    noise_std_m: float = number(0.01, "m", "of x and of y, independent from picture to picture")
+    noise_std_rad: float = number(math.radians(0.5), "rad", "the same of the yaw")
+    bias_std_m: float = number(0.005, "m", "of x and of y, constant for each camera: calibration")
+    spacing_m: float = number(3.0, "m", "between cameras, in a grid over the floor", low=1e-6)
+    height_m: float = number(2.7, "m", "of them above the floor")
+    reach_m: float = number(2.5, "m", "along the floor, from beneath a camera, that it sees")
+    tag_height_m: float = number(0.52, "m", "of the tags above the floor")
+    tag_side_m: float = number(0.24, "m", "of the square whose corners must be seen")
 
     def __post_init__(self) -> None:
-        check_types(self)
-        check_not_negative(self)
-        for name in ("rate_hz", "spacing_m"):
-            if getattr(self, name) == 0.0:
-                raise InvalidValueError(f"TagCameraConfig.{name} must be > 0, got 0.0")
+        super().__post_init__()
         if self.height_m <= self.tag_height_m:
             raise InvalidValueError(
                 f"TagCameraConfig.height_m must be above tag_height_m, got {self.height_m}"

@@ -14,6 +14,7 @@ from sim.view.parts import Placed
 from slam import se2
 from slam.estimate import Estimate, Landmarks, Raster
 from slam.frames import NS_PER_S, Float, Frame
+from slam.rasters import joined, trimmed
 from slam.replay import Replay, Track, primary_of
 from slam.system import MovingMap
 
@@ -177,11 +178,11 @@ class Moments:
 def small_map(track: Track) -> Raster | None:
     """What is known of a map, each cell the largest of several where it has too many for a
     picture: a thin wall stays."""
-    cells = track.map_strips()
-    known = None if cells is None else cells.trimmed()
+    raster = track.map()
+    known = None if raster is None else trimmed(raster)
     if known is None:
         return None
-    return known.joined(max(-(-max(known.shape) // MOST_CELLS), 1)).whole()
+    return joined(known, max(-(-max(known.values.shape) // MOST_CELLS), 1))
 
 
 def verdict_of(estimate: Estimate) -> str:

@@ -27,7 +27,7 @@ from sim.core.contacts import Touches, collect
 from sim.core.engine import Engine, call
 from sim.core.state import Records
 from sim.sensors.lidar.windows import Noted, note
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 
 Float = NDArray[np.float64]
 SUBSTEPS_PER_S = 300
@@ -137,7 +137,7 @@ def pin(physics: Physics, pinned: Pinned) -> None:
         physics.ctrl[servo] = 0.0
 
 
-@njit
+@uncounted
 def advance(first: int, last: int, resumed: bool, room: Any, watch: Any) -> int:  # noqa: C901 (kernel)
     """Make the substeps that end at rows ``first + 1`` to ``last`` of ``watch``.
 

@@ -182,11 +182,6 @@ class World:
         """The share of what is out of sight that is put elsewhere."""
         return 0.0 if self._rearranging is None else self._rearranging.share
 
-    def seen_since_drawn(self) -> NDArray[np.bool_]:
-        """(n,) whether each mover was seen since it was last drawn for a change out of sight."""
-        found = self._rearranging
-        return np.zeros(len(self.mover_names), bool) if found is None else found.seen()
-
     def rearrange(self, spec: LaserSpec, *, at_once: bool = False) -> list[Rearrangement]:
         """Between two scans: change what that scanner cannot see now.
 

@@ -29,10 +29,7 @@ class EkfConfig(Settings):
         "extractor": "slam.frontend.corners",
     }
 
-    association: str = word(
-        "ipjc", ("ipjc", "jcbb", "individual"), "IPJC, joint compatibility branch and bound, "
-        "or each pair alone",
-    )  # fmt: skip
+    association: str = word("ipjc", ("ipjc", "individual"), "IPJC, or each pair alone")
     individual_gate: float = number(
         0.999999, "prob", "of chi-square, a pair alone, 2 dof", SEEDS, low=0.5, high=MOST_GATE
     )

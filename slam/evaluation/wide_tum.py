@@ -17,17 +17,15 @@ from pathlib import Path
 
 import numpy as np
 
-from slam.bounded import text_of
 from slam.checked import finite
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import InvalidValueError
 from slam.files import write_text
 from slam.frames import Float
-from slam.trajectory import MAX_TUM_BYTES, Trajectory, tum_pose, tum_stamp
+from slam.trajectory import Trajectory, tum_stamp
 
 FLAT = 1e-10  # m², rad²: (10 um)², of z, roll, pitch; smfeval takes less than 1e-12 for none
 ROUNDING = 1e-6  # of the trace of a covariance: a few times that of single precision
 FORMAT = "SQUARE/0.3"
-TUM_WORDS, ENTRIES = 8, 21  # in a line: the pose, and the lower triangle
 PLANAR = (0, 1, 5)  # x, y and yaw among x, y, z, roll, pitch, yaw
 _LOWER = np.tril_indices(6)
 
@@ -38,12 +36,6 @@ def to_body(covariance: Float, theta: float) -> Float:
     whole = np.diag(np.full(6, FLAT))
     whole[np.ix_(PLANAR, PLANAR)] = turn.T @ covariance @ turn
     return whole
-
-
-def to_map(whole: Float, theta: float) -> Float:
-    """Inverse of ``to_body``."""
-    turn = _turn(theta)
-    return np.asarray(turn @ whole[np.ix_(PLANAR, PLANAR)] @ turn.T)
 
 
 def _turn(theta: float) -> Float:
@@ -126,45 +118,3 @@ def _checked(covariances: Float, n: int) -> Float:
         )
     more = np.where(least < FLAT, FLAT + np.maximum(FLAT, -least), 0.0)
     return symmetric + more[:, None, None] * np.eye(3)
-
-
-def read_wide_tum(path: Path) -> tuple[Trajectory, Float]:
-    """The planar part: poses, and (n, 3, 3) covariances of x, y, heading in the map.
-
-    Raises ``LogFormatError`` with the line for what is no wide TUM.
-    """
-    stamps: list[int] = []
-    poses: list[tuple[float, float, float]] = []
-    covariances: list[Float] = []
-    for number, line in enumerate(text_of(path, MAX_TUM_BYTES).splitlines(), 1):
-        words = line.split()
-        if not words or line.startswith("#"):
-            continue
-        try:
-            stamp_ns, pose = tum_pose(words[:TUM_WORDS])
-            if stamps and stamp_ns <= stamps[-1]:
-                raise ValueError("time does not increase")
-            covariances.append(to_map(_whole(words[TUM_WORDS:]), pose[2]))
-        except (ValueError, ArithmeticError) as error:
-            raise LogFormatError(path, f"no wide TUM: {error}", number) from error
-        stamps.append(stamp_ns)
-        poses.append(pose)
-    trajectory = Trajectory(
-        stamps_ns=np.array(stamps, dtype=np.int64), poses=np.array(poses).reshape(-1, 3)
-    )
-    return trajectory, np.array(covariances).reshape(-1, 3, 3)
-
-
-def _whole(words: list[str]) -> Float:
-    """The (6, 6) covariance of a lower triangle."""
-    if len(words) != ENTRIES:
-        raise ValueError(f"expected {TUM_WORDS + ENTRIES} numbers, found {TUM_WORDS + len(words)}")
-    values = np.array([float(word) for word in words])
-    if not np.isfinite(values).all():
-        raise ValueError("expected finite numbers in the covariance")
-    lower = np.zeros((6, 6))
-    lower[_LOWER] = values
-    whole = lower + lower.T - np.diag(np.diag(lower))
-    if float(np.diag(whole).min()) < 0.0:
-        raise ValueError(f"expected variances >= 0, found {float(np.diag(whole).min()):g}")
-    return np.asarray(whole, dtype=np.float64)

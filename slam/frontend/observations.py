@@ -19,7 +19,7 @@ from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, LaserSpec, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
-from slam.frontend.surfaces import NEAR_CELLS, face, join, unmixed
+from slam.frontend.surfaces import NEAR_CELLS, face, follow_ends, join, unmixed
 from slam.frontend.visibility import SILENT_M, View, view_of_beams, view_of_features
 
 SPACING_M = 0.1  # m; beams closer than this share one weight; set by hand
@@ -174,7 +174,7 @@ def _surveyed(  # noqa: PLR0913 (kernel)
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],
     near: float,
-    increment: float,
+    sweep: tuple[float, int, float],
     variance: float,
     joined: NDArray[np.bool_],
     tangents: NDArray[np.float64],
@@ -184,15 +184,16 @@ def _surveyed(  # noqa: PLR0913 (kernel)
 ) -> int:
     """Surfaces through the hits; those that remain are moved to the front, and their number.
 
-    near  m, see ``join``; increment  rad between beams; variance  m^2 of every observation
+    near  m, see ``join``; sweep  see ``follow_ends``; variance  m^2 of every observation
     """
     join(points, beams, origin, near, joined, tangents)
+    follow_ends(points, beams, origin, joined, sweep, tangents)
     count = _cleared(points, beams, origin, joined, tangents)
     face(points[:count], origin, joined, facings)
     for k in range(count):
         covariances[k, 0], covariances[k, 1], covariances[k, 2] = variance, 0.0, variance
         x, y = points[k, 0], points[k, 1]
-        share = math.sqrt(x * x + y * y) * increment / SPACING_M
+        share = math.sqrt(x * x + y * y) * sweep[0] / SPACING_M
         weights[k] = min(max(share, LEAST_WEIGHT), 1.0)
     return count
 
@@ -233,8 +234,8 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     )
     covariances, weights = np.empty((count, 3)), np.empty(count)
     left = _surveyed(
-        points, beams, spec.T_robot_laser, NEAR_CELLS * grain.cell_m, spec.angle_increment,
-        max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2,
+        points, beams, spec.T_robot_laser, NEAR_CELLS * grain.cell_m,
+        (spec.angle_increment, n, use), max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2,
         onward, tangents, facings, covariances, weights,
     )  # fmt: skip
     view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m)

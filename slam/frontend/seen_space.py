@@ -7,7 +7,7 @@ wants both, so whoever writes such a map keeps this beside it.
 
 from __future__ import annotations
 
-from collections.abc import Iterator, Mapping, Sequence
+import math
 
 import cv2
 import numpy as np
@@ -15,9 +15,10 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.errors import InvalidValueError
+from slam.estimate import Raster
 from slam.frames import Float, Scan
 from slam.frontend.visibility import SILENT_M
-from slam.strips import MapStrips, Piece, Rectangle, Span, edges, runs
+from slam.rasters import joined, trimmed
 
 _CHUNK = 512  # cells along a tile: of small ones OpenCV takes as long for each scan and tile
 _SHIFT = 4  # bits of the parts of a cell in which OpenCV takes corners
@@ -58,111 +59,57 @@ class SeenSpace:
                 local = fixed - (column * _CHUNK * _PARTS, row * _CHUNK * _PARTS)
                 cv2.fillPoly(tile, [local.astype(np.int32)], 1, cv2.LINE_8, _SHIFT)
 
-    def _occupied_tiles(self) -> Iterator[tuple[int, int]]:
-        return (key for key, tile in self._tiles.items() if tile.any())
-
-    def merge(self, map_: MapStrips) -> MapStrips:
+    def merge(self, map_: Raster, most: float = math.inf) -> Raster:
         """``map_`` with 0 where it was unknown and something has been seen, the unknown rim left
-        out.
+        out; in cells so much wider that it has ``most`` at most.
 
         Only maps along the map frame's axes. What is seen later is not in it.
         """
-        x, y, yaw = map_.T_map_origin.tolist()
+        yaw = float(map_.T_map_origin[2])
         if yaw != 0.0:
             raise InvalidValueError(f"merge needs a map along the map's axes, got yaw {yaw} rad")
-        step, size = map_.resolution_m, _CHUNK * self.resolution_m
-        height, width = map_.shape
-        keys = np.array(list(self._occupied_tiles()), dtype=int).reshape(-1, 2)
+        keys = np.array([key for key, tile in self._tiles.items() if tile.any()], dtype=int)
         if len(keys) == 0:
             return map_
-        corner = np.array([x, y])
-        opposite = corner + np.array([width, height]) * step
+        n = 1
+        origin, before, (width, height) = self._around(map_, n, keys)
+        while width * height > most:
+            n += 1
+            origin, before, (width, height) = self._around(map_, n, keys)
+        known = joined(map_, n).values
+        out = np.full((height, width), np.nan, np.float32)
+        out[before[1] :, before[0] :][: known.shape[0], : known.shape[1]] = known
+        step = n * map_.resolution_m
+        rows, columns = self._cells(origin[1], height, step), self._cells(origin[0], width, step)
+        for row, column in keys.tolist():
+            (i0, i1), (j0, j1) = (
+                np.searchsorted(ours, (tile * _CHUNK, (tile + 1) * _CHUNK)).tolist()
+                for ours, tile in ((rows, row), (columns, column))
+            )
+            at = np.ix_(rows[i0:i1] % _CHUNK, columns[j0:j1] % _CHUNK)
+            part = out[i0:i1, j0:j1]
+            part[np.isnan(part) & (self._tiles[row, column][at] != 0)] = 0.0
+        T_map_origin = np.array([*origin, 0.0])
+        return trimmed(Raster(values=out, resolution_m=step, T_map_origin=T_map_origin)) or map_
+
+    def _around(
+        self, map_: Raster, n: int, keys: NDArray[np.int64]
+    ) -> tuple[Float, NDArray[np.int64], list[int]]:
+        """Of cells ``n`` times as wide as the map's around it and the tiles ``keys``: origin (2,)
+        m, how many (2,) lie before the map, and how many there are along x and y.
+        """
+        step, size = n * map_.resolution_m, _CHUNK * self.resolution_m
+        inner = -(-np.array(map_.values.shape[::-1]) // n)
+        corner = map_.T_map_origin[:2]
+        opposite = corner + inner * step
         low = np.minimum(corner, keys.min(axis=0)[::-1] * size)
         high = np.maximum(opposite, (keys.max(axis=0)[::-1] + 1) * size)
         before = np.ceil((corner - low) / step - 1e-9).astype(int)
         after = np.ceil((high - opposite) / step - 1e-9).astype(int)
-        first_row, first_column = int(before[1]), int(before[0])
-        shape = height + first_row + int(after[1]), width + first_column + int(after[0])
-        origin = corner - before * step
-        ours = self._cells(origin[1], shape[0], step), self._cells(origin[0], shape[1], step)
-        in_row = {row: np.sort(keys[keys[:, 0] == row, 1]).tolist() for row in set(keys[:, 0])}
-
-        def pieces(first: int, last: int) -> Iterator[Piece]:
-            rows, columns = ours[0][first:last], ours[1]
-            a, b = max(first, first_row), min(last, first_row + height)
-            there = [] if a >= b else map_.pieces(a - first_row, b - first_row)
-            known = [(column + first_column, values) for column, values in there]
-            seen = list(_tiles_met(rows, columns, in_row))
-            spans = [(column, column + values.shape[1]) for column, values in known]
-            for left, right in runs(spans + [span for _, _, span in seen]):
-                out = np.full((last - first, right - left), np.nan, np.float32)
-                for column, values in known:
-                    if left <= column < right:
-                        end = column - left + values.shape[1]
-                        out[a - first : b - first, column - left : end] = values
-                for key, (i0, i1), (j0, j1) in seen:
-                    if left <= j0 < right:
-                        at = np.ix_(rows[i0:i1] % _CHUNK, columns[j0:j1] % _CHUNK)
-                        part = out[i0:i1, j0 - left : j1 - left]
-                        part[np.isnan(part) & (self._tiles[key][at] != 0)] = 0.0
-                yield left, out
-
-        T_map_origin = np.array([*origin, 0.0])
-        whole = MapStrips(
-            shape=shape,
-            resolution_m=step,
-            T_map_origin=T_map_origin,
-            pieces=pieces,
-            extent=lambda: _around(
-                self._extent(ours, in_row), map_.known(), first_row, first_column
-            ),
-        )
-        return whole.trimmed() or map_
-
-    def _extent(
-        self,
-        ours: tuple[NDArray[np.int64], NDArray[np.int64]],
-        in_row: Mapping[int, Sequence[int]],
-    ) -> Rectangle | None:
-        """Of what has been seen, in rows and columns of which ``ours`` are our cells."""
-        met = {key: spans for key, *spans in _tiles_met(*ours, in_row)}
-
-        def known(row: int, column: int) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
-            (i0, i1), (j0, j1) = met[row, column]
-            at = np.ix_(ours[0][i0:i1] % _CHUNK, ours[1][j0:j1] % _CHUNK)
-            there = self._tiles[row, column][at] != 0
-            return i0 + np.flatnonzero(there.any(axis=1)), j0 + np.flatnonzero(there.any(axis=0))
-
-        return edges(list(met), known)
+        return corner - before * step, before, (before + inner + after).tolist()
 
     def _cells(self, edge: float, count: int, step: float) -> NDArray[np.int64]:
         """Our cells, along one axis, in which the centres of ``count`` others from ``edge`` lie."""
         centres = edge + (np.arange(count) + 0.5) * step
         cells: NDArray[np.int64] = np.floor(centres / self.resolution_m).astype(np.int64)
         return cells
-
-
-def _around(
-    one: Rectangle | None, other: Rectangle | None, rows: int, columns: int
-) -> Rectangle | None:
-    """The least rectangle around ``one`` and ``other``, moved by ``rows`` and ``columns``."""
-    if other is None:
-        return one
-    other = other[0] + rows, other[1] + columns, other[2] + rows, other[3] + columns
-    if one is None:
-        return other
-    return (
-        min(one[0], other[0]), min(one[1], other[1]), max(one[2], other[2]), max(one[3], other[3])
-    )  # fmt: skip
-
-
-def _tiles_met(
-    rows: NDArray[np.int64], columns: NDArray[np.int64], in_row: Mapping[int, Sequence[int]]
-) -> Iterator[tuple[tuple[int, int], Span, Span]]:
-    """Tiles with any of ``rows`` and ``columns`` (rising), and which of these they have."""
-    for row in range(int(rows[0]) // _CHUNK, int(rows[-1]) // _CHUNK + 1):
-        i0, i1 = np.searchsorted(rows, (row * _CHUNK, (row + 1) * _CHUNK)).tolist()
-        for column in in_row.get(row, ()):
-            j0, j1 = np.searchsorted(columns, (column * _CHUNK, (column + 1) * _CHUNK)).tolist()
-            if i0 < i1 and j0 < j1:
-                yield (row, column), (i0, i1), (j0, j1)

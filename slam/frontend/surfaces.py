@@ -101,6 +101,72 @@ def join(
 
 
 @inner
+def follow_ends(
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    origin: NDArray[np.float64],
+    joined: NDArray[np.bool_],
+    sweep: tuple[float, int, float],
+    tangents: NDArray[np.float64],
+) -> None:
+    """Fill the tangents where a surface is no longer seen, but need not end.
+
+    An end is one only where the next beam sees past it. Behind something nearer, beyond the range
+    or the last beam the surface may go on, and its last hit says nothing along it: it moves with
+    the robot. ``sweep``: rad between beams, how many there are, and the range (m) of their use.
+    """
+    n = len(points)
+    for k in range(n):
+        for way in (-1, 1):
+            before, after = k - way, k + way
+            if before < 0 or before >= n or not joined[min(k, before)]:
+                continue
+            if 0 <= after < n and joined[min(k, after)]:
+                continue
+            first = before  # far enough back for a direction
+            while _apart(points, first, k) < FACE_M:
+                further = first - way
+                if further < 0 or further >= n or not joined[min(first, further)]:
+                    break
+                first = further
+            length = _apart(points, first, k)
+            if length < FACE_M:
+                continue
+            tx, ty = (points[k, 0] - points[first, 0]) / length, points[k, 1] - points[first, 1]
+            ty /= length
+            ahead = _onward(points, k, origin, tx, ty, sweep[0])
+            step = abs(beams[k] - beams[before])
+            beam = beams[k] + (beams[k] - beams[before]) // max(step, 1)
+            near = 0 <= after < n and beams[after] == beam
+            if near:
+                seen = _range(points, after, origin)
+                slack = max(SLACK_M, SLACK * (ahead - _range(points, k, origin)))
+                ends = seen > ahead + slack
+            else:
+                ends = 0 <= beam < sweep[1] and ahead < sweep[2]
+            if not ends:
+                tangents[k, 0], tangents[k, 1] = tx, ty
+
+
+@inner
+def _onward(
+    points: NDArray[np.float64], k: int, origin: NDArray[np.float64], tx: float, ty: float,
+    increment: float,
+) -> float:  # fmt: skip
+    """Range (m) at which the next beam meets the line through hit ``k`` along (tx, ty); inf: never.
+
+    The next one on that side to which (tx, ty) leads.
+    """
+    x, y = points[k, 0] - origin[0], points[k, 1] - origin[1]
+    turn = abs(increment) if x * ty - y * tx > 0.0 else -abs(increment)
+    c, s = math.cos(turn), math.sin(turn)
+    bx, by = c * x - s * y, s * x + c * y
+    cross = bx * ty - by * tx
+    share = (x * ty - y * tx) / cross if cross != 0.0 else -1.0
+    return share * math.sqrt(x * x + y * y) if share > 0.0 else math.inf
+
+
+@inner
 def face(
     points: NDArray[np.float64],
     origin: NDArray[np.float64],

@@ -15,17 +15,15 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
-from slam.estimate import MapSquares
 from slam.frames import Float
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.grid.config import OccupancyConfig
+from slam.shunting.map.network import Network
 from slam.system import Raster, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
     ANEW,
     FREE_COUNT,
-    MASK,
-    SHIFT,
     SIDE,
     Cells,
     Look,
@@ -33,7 +31,6 @@ from slam.tracker.cells import (
     in_reach,
 )  # fmt: skip
 from slam.tracker.tracker import Tracker
-from slam.tracker.two_memories import TwoMemories
 
 
 class Odds(NamedTuple):
@@ -132,18 +129,24 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
 
 @njit
 def _probabilities(
-    cells: Cells, log_odds: NDArray[np.float32], i0: int, j0: int, out: NDArray[np.float32]
+    cells: Cells, log_odds: NDArray[np.float32], i0: int, j0: int, n: int, out: NDArray[np.float32]
 ) -> None:
+    """Into ``out``, NaN so far, from cell (i0, j0) on, ``n`` a side as one: the largest of them."""
     rows, columns = cells.directory.shape
-    for a in range(out.shape[0]):
-        for b in range(out.shape[1]):
-            i, j = i0 + b, j0 + a
-            row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
-            out[a, b] = np.nan
-            if 0 <= row < rows and 0 <= column < columns and cells.directory[row, column] >= 0:
-                odds = log_odds[cells.directory[row, column], j & MASK, i & MASK]
-                if odds != 0.0:
-                    out[a, b] = 0.5 + 0.5 * math.tanh(0.5 * odds)
+    for row in range(rows):
+        for column in range(columns):
+            slot = cells.directory[row, column]
+            if slot < 0:
+                continue
+            for jj in range(SIDE):
+                for ii in range(SIDE):
+                    odds = log_odds[slot, jj, ii]
+                    if odds != 0.0:
+                        a = ((row + cells.corner[1]) * SIDE + jj - j0) // n
+                        b = ((column + cells.corner[0]) * SIDE + ii - i0) // n
+                        p = np.float32(0.5 + 0.5 * math.tanh(0.5 * odds))
+                        if not out[a, b] >= p:
+                            out[a, b] = p
 
 
 class Grid(CellMap):
@@ -206,18 +209,16 @@ class Grid(CellMap):
             self.release()
         return result
 
-    def probabilities(
-        self, bounds: tuple[float, float, float, float] | None = None
-    ) -> Raster | None:
-        """p of every cell that was ever seen, NaN elsewhere; within ``bounds``, m, or all."""
-        extent = self.raster_extent(bounds)
+    def probabilities(self) -> Raster | None:
+        """p of every cell that was ever seen, NaN elsewhere; wider cells where it is too large."""
+        extent = self.extent()
         if extent is None:
             return None
         i0, j0, i1, j1 = extent
-        values = np.empty((j1 - j0, i1 - i0), np.float32)
-        _probabilities(self.cells, self.log_odds, i0, j0, values)
-        origin = np.array([i0 * self.cell, j0 * self.cell, 0.0])
-        return Raster(values=values, resolution_m=self.cell, T_map_origin=origin)
+        n = self.coarseness(extent)
+        values = np.full((-(-(j1 - j0) // n), -(-(i1 - i0) // n)), np.nan, np.float32)
+        _probabilities(self.cells, self.log_odds, i0, j0, n, values)
+        return self.raster(values, extent, n)
 
 
 @register("occupancy")
@@ -241,8 +242,8 @@ class OccupancySlam(Tracker):
     def _new_map(config: OccupancyConfig) -> Grid:
         return Grid(config)
 
-    def _new_submap(self) -> TwoMemories:
-        return TwoMemories(self.config)
+    def _new_submap(self) -> Network:
+        return Network(self.config, lateral=False)
 
     def changes(self) -> None:
         """A grid has but one memory."""
@@ -252,13 +253,3 @@ class OccupancySlam(Tracker):
         grid = self.cell_map
         assert isinstance(grid, Grid)
         return grid.probabilities()
-
-    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
-        """The same within xmin, ymin, xmax, ymax, m; None for an empty grid."""
-        grid = self.cell_map
-        assert isinstance(grid, Grid)
-        return grid.probabilities(bounds)
-
-    def map_squares(self) -> MapSquares:
-        """Where cells were seen."""
-        return self.cell_map.squares()

@@ -1,20 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which observed point is which landmark: one by one, JCBB, and IPJC.
+"""Which observed point is which landmark: one by one, or jointly (IPJC).
 
-A *hypothesis* gives each point a landmark or none. All three search for the hypothesis with most
-pairs, and among those for the least joint cost, and differ in how they judge one:
+A *hypothesis* gives each point a landmark or none. Both search for the hypothesis with most pairs,
+and among those for the least cost, and differ in how they judge one:
 
 - ``individual``: each pair alone; the robot's error, which all pairs share, is not seen as such;
-- ``jcbb`` (Neira and Tardos 2001): all pairs together under the *prior*, linearised there once. The
-  test of a pair at depth k costs O(k^2);
 - ``ipjc`` (Li and Olson 2012): each accepted pair updates the state, and the posterior judges the
   next, linearised where the pairs before have moved it. Any test costs O(1), an acceptance O(c^2)
   for c candidate landmarks. After each, all pairs that are left are tested again: the posterior
   shows which points no landmark can explain any more, and hypotheses that leave out good pairs are
   cut at once.
 
-On linear problems the costs of JCBB and IPJC are equal (chain rule of the Gaussian), and so are
-their answers wherever the gate on what a pair adds, which only IPJC has, cuts nothing.
+On linear problems the costs of IPJC sum up to the joint chi-square of all pairs (chain rule of the
+Gaussian), which joint compatibility branch and bound (Neira and Tardos 2001) tests.
 """
 
 from __future__ import annotations
@@ -26,9 +24,9 @@ from numpy.typing import NDArray
 
 from slam.frames import Float
 from slam.landmarks import kernels
-from slam.landmarks.compatibility import CUT_SHORT, NODES, TESTS, Jcbb, Search, distances, visit
+from slam.landmarks.compatibility import Search, distances, visit
 from slam.landmarks.filter import EkfFilter
-from slam.landmarks.hypotheses import Association, Best, Effort, Gates, Ints
+from slam.landmarks.hypotheses import Association, Gates, Ints
 
 Associate = Callable[[EkfFilter, Ints, Float, Float, Gates], Association]
 
@@ -39,26 +37,14 @@ def individual(
     """Nearest neighbours: the cheapest pair of all first, each point and landmark once."""
     costs = _prior_costs(state, chosen, points, covariances, gates)
     landmarks, plausible = np.full(len(points), -1), _any(costs)
-    effort, total = Effort(tests=costs.size), 0.0
+    total = 0.0
     while costs.size and np.isfinite(costs.min()):
         k, j = np.unravel_index(int(costs.argmin()), costs.shape)
         total += float(costs[k, j])
         landmarks[k] = chosen[j]
         costs[k, :] = np.inf
         costs[:, j] = np.inf
-    return Association(landmarks=landmarks, cost=total, plausible=plausible, effort=effort)
-
-
-def jcbb(
-    state: EkfFilter, chosen: Ints, points: Float, covariances: Float, gates: Gates
-) -> Association:
-    """Joint compatibility branch and bound: the reference, for small sets."""
-    costs = _prior_costs(state, chosen, points, covariances, gates)
-    best = Best(landmarks=[-1] * len(points))
-    order = _order(costs)
-    search = Jcbb(state, chosen, (points, covariances), costs, gates, best, order)
-    search.visit(0, [], np.zeros((0, 0)), np.zeros(0), 0.0)
-    return _answer(best, chosen, costs)
+    return Association(landmarks=landmarks, cost=total, plausible=plausible)
 
 
 def ipjc(
@@ -68,8 +54,7 @@ def ipjc(
     costs = _prior_costs(state, chosen, points, covariances, gates)
     columns = np.flatnonzero(np.isfinite(costs).any(axis=0))
     near, order = chosen[columns], _order(costs)
-    k, counts = len(order), np.zeros(4, dtype=np.int64)
-    counts[TESTS] = costs.size
+    k = len(order)
     search = Search(
         points=points[order],
         covariances=covariances[order],
@@ -81,25 +66,16 @@ def ipjc(
         taken=np.zeros(len(near), dtype=np.bool_),
         best=np.full(k, -1),
         best_cost=np.zeros(1),
-        counts=counts,
+        counts=np.zeros(2, dtype=np.int64),
     )
     P = kernels.gather(state.error_covariance, near)
     visit(search, state.pose, state.landmarks[near], P, 0, 0, 0.0)
     found = np.full(len(points), -1)
     found[order] = np.where(search.best >= 0, near[search.best], -1) if k else found[:0]
-    return Association(
-        landmarks=found,
-        cost=float(search.best_cost[0]),
-        plausible=_any(costs),
-        effort=Effort(
-            nodes=int(counts[NODES]),
-            tests=int(counts[TESTS]),
-            complete=not counts[CUT_SHORT],
-        ),
-    )
+    return Association(landmarks=found, cost=float(search.best_cost[0]), plausible=_any(costs))
 
 
-METHODS: dict[str, Associate] = {"individual": individual, "jcbb": jcbb, "ipjc": ipjc}
+METHODS: dict[str, Associate] = {"individual": individual, "ipjc": ipjc}
 
 
 def _prior_costs(
@@ -129,13 +105,3 @@ def _order(costs: Float) -> list[int]:
     """Points that have a candidate, the least ambiguous first."""
     counts = np.isfinite(costs).sum(axis=1)
     return [int(k) for k in np.argsort(counts, kind="stable") if counts[k] > 0]
-
-
-def _answer(best: Best, names: Ints, costs: Float) -> Association:
-    found = np.array([names[j] if j >= 0 else -1 for j in best.landmarks], dtype=np.int64)
-    return Association(
-        landmarks=found,
-        cost=best.cost,
-        plausible=_any(costs),
-        effort=best.effort,
-    )

@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiled searches for pairs of points and landmarks that are compatible, alone and jointly.
 
-Joint compatibility branch and bound (Neira and Tardos 2001) as published: pairs within the
-individual gate, hypotheses within the joint gate, and no other one. Incremental posterior joint
-compatibility: Li and Olson 2012.
+Incremental posterior joint compatibility: Li and Olson 2012.
 """
 
 from __future__ import annotations
 
-import math
 from typing import NamedTuple
 
 import numpy as np
@@ -16,10 +13,8 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 from slam.frames import Float
-from slam.landmarks import kernels
-from slam.landmarks.filter import EkfFilter
-from slam.landmarks.hypotheses import Best, Gates, Ints
-from slam.landmarks.kernels import ITERATIONS, SETTLED, absorb, look, times, times_transposed
+from slam.landmarks.hypotheses import Ints
+from slam.landmarks.kernels import ITERATIONS, SETTLED, absorb, look
 
 
 @njit
@@ -124,7 +119,7 @@ def pair_cost(pose: Float, landmark: Float, M: Float, z: Float, R: Float) -> flo
 
 
 Bools = NDArray[np.bool_]
-PAIRS, NODES, TESTS, CUT_SHORT = range(4)  # places in ``Search.counts``
+PAIRS, NODES = range(2)  # places in ``Search.counts``
 
 
 class Search(NamedTuple):
@@ -137,7 +132,7 @@ class Search(NamedTuple):
     most_nodes           hypotheses looked into
     chosen, taken        (k,) place of each point's landmark or -1, (n,): the hypothesis looked into
     best, best_cost      (k,), (1,): the best one so far
-    counts               (4,) pairs of the best one; nodes; tests of a pair; 1 if it was cut short
+    counts               (2,) pairs of the best one; hypotheses looked into so far
     """
 
     points: Float
@@ -166,12 +161,9 @@ def _judge(  # noqa: PLR0913 (kernel)
 ) -> Float:
     """(k, n) what each pair of a point from ``first`` on with a landmark not taken would add."""
     wanted = np.zeros_like(search.plausible)
-    tests = 0
     for i in range(first, wanted.shape[0]):
         for j in range(wanted.shape[1]):
             wanted[i, j] = search.plausible[i, j] and not search.taken[j]
-            tests += wanted[i, j]
-    search.counts[TESTS] += tests
     # No joint cost ever falls: what is too dear now is too dear with any pairs to come.
     limit = search.together[pairs + len(wanted) - first] - cost
     return distances(
@@ -215,7 +207,6 @@ def visit(  # noqa: C901, PLR0913 (kernel)
             return
         counts[NODES] += 1
         if counts[NODES] > search.most_nodes:
-            counts[CUT_SHORT] = 1
             return
         while possible[i + 1] == left:
             i += 1
@@ -234,98 +225,3 @@ def visit(  # noqa: C901, PLR0913 (kernel)
                     search.chosen[i], search.taken[j] = -1, False
             j = _next(costs[i], costs[i, j], j)
         i += 1
-
-
-class Jcbb:
-    """Interpretation tree over the points in order; the joint cost by an incremental Cholesky."""
-
-    def __init__(  # noqa: PLR0913 (arrays of one problem)
-        self,
-        state: EkfFilter,
-        chosen: Ints,
-        seen: tuple[Float, Float],
-        costs: Float,
-        gates: Gates,
-        best: Best,
-        order: list[int],
-    ) -> None:
-        self.points, self.covariances = seen
-        self.costs, self.gates, self.best, self.order = costs, gates, best, order
-        n, xi = len(chosen), np.zeros(3 + 2 * len(chosen))
-        h, block = np.zeros(2), np.zeros((2, 5))
-        H = np.zeros((2 * n, 3 + 2 * n))
-        self.predicted = np.zeros((n, 2))
-        for j, landmark in enumerate(state.landmarks[chosen]):
-            kernels.look(state.pose, landmark, xi, 3 + 2 * j, h, block)
-            H[2 * j : 2 * j + 2, :3] = block[:, :3]
-            H[2 * j : 2 * j + 2, 3 + 2 * j : 5 + 2 * j] = block[:, 3:]
-            self.predicted[j] = h
-        marginal = kernels.gather(state.error_covariance, chosen)
-        self.S: Float = times(H, times_transposed(marginal, H))
-
-    def visit(
-        self, depth: int, pairs: list[tuple[int, int]], L: Float, white: Float, cost: float
-    ) -> None:
-        """``L`` Cholesky factor of the pairs' joint covariance, ``white`` = L^-1 innovation."""
-        best = self.best
-        best.effort.nodes += 1
-        if best.effort.nodes > self.gates.most_nodes * 1000:
-            best.effort.complete = False
-            return
-        if depth == len(self.order):
-            if best.beaten_by(len(pairs), cost):
-                best.keep(pairs, cost)
-            return
-        k, taken = self.order[depth], {j for _, j in pairs}
-        for j in np.argsort(self.costs[k], kind="stable").tolist():
-            if not np.isfinite(self.costs[k, j]) or j in taken:
-                continue
-            grown, whitened = self._grow(k, j, pairs, L, white)
-            total = cost + float((whitened[-2:] ** 2).sum())
-            count, left = len(pairs) + 1, len(self.order) - depth - 1
-            if total <= self.gates.together(count) and self._promising(count + left, total):
-                self.visit(depth + 1, [*pairs, (k, j)], grown, whitened, total)
-        if self._promising(len(pairs) + len(self.order) - depth - 1, cost):
-            self.visit(depth + 1, pairs, L, white, cost)
-
-    def _promising(self, most: int, cost: float) -> bool:
-        return self.best.beaten_by(most, cost)
-
-    def _grow(
-        self, k: int, j: int, pairs: list[tuple[int, int]], L: Float, white: Float
-    ) -> tuple[Float, Float]:
-        self.best.effort.tests += 1
-        rows = slice(2 * j, 2 * j + 2)
-        columns = np.array([(2 * i, 2 * i + 1) for _, i in pairs], dtype=np.int64).ravel()
-        cross, own = self.S[rows][:, columns], self.S[rows, rows] + self.covariances[k]
-        return grow(L, white, cross, own, self.points[k] - self.predicted[j])
-
-
-@njit
-def grow(L: Float, white: Float, cross: Float, own: Float, fresh: Float) -> tuple[Float, Float]:
-    """Cholesky factor and whitened innovation with two more rows.
-
-    cross (2, n) and own (2, 2) are their covariances, fresh (2,) their innovation. Where these have
-    no positive definite covariance the new rows are infinite: no gate lets them pass.
-    """
-    n = len(L)
-    grown, whitened = np.zeros((n + 2, n + 2)), np.zeros(n + 2)
-    grown[:n, :n], whitened[:n] = L, white
-    for i in range(2):
-        row = grown[n + i]
-        whitened[n + i] = fresh[i]
-        for j in range(n + i):
-            row[j] = cross[i, j] if j < n else own[i, j - n]
-            for k in range(j):
-                row[j] -= row[k] * grown[j, k]
-            row[j] /= grown[j, j]
-            whitened[n + i] -= row[j] * whitened[j]
-        left = own[i, i]
-        for j in range(n + i):
-            left -= row[j] * row[j]
-        if not left > 0.0:
-            whitened[n:] = np.inf
-            return grown, whitened
-        row[n + i] = math.sqrt(left)
-        whitened[n + i] /= row[n + i]
-    return grown, whitened

@@ -1,9 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Hypotheses of association: by which gates they are judged, what the best one so far is."""
+"""Hypotheses of association: by which gates they are judged, what is found."""
 
 from __future__ import annotations
 
-from dataclasses import dataclass, field
+from dataclasses import dataclass
 from functools import lru_cache
 
 import numpy as np
@@ -52,9 +52,7 @@ class Gates(Settings):
         low=0.5,
         high=MOST_GATE,
     )
-    most_nodes: int = number(
-        400, "hypotheses", "examined (JCBB: thousands); then the best counts", low=1
-    )
+    most_nodes: int = number(400, "hypotheses", "examined; then the best counts", low=1)
 
     def single(self) -> float:
         """Limit of a pair's cost under the prior."""
@@ -69,16 +67,6 @@ class Gates(Settings):
         return chi_square(self.posterior, 2)
 
 
-@dataclass(kw_only=True)
-class Effort:
-    """What a search did: ``nodes`` looked into and ``tests`` of a pair, each counted where it is
-    made; ``complete`` unless cut short."""
-
-    nodes: int = 0
-    tests: int = 0
-    complete: bool = True
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Association:
     """``landmarks`` (k,) the landmark of each point or -1; ``cost`` the joint chi-square.
@@ -89,30 +77,8 @@ class Association:
     landmarks: Ints
     cost: float
     plausible: NDArray[np.bool_]
-    effort: Effort
 
     @property
     def matched(self) -> int:
         """Number of pairs."""
         return int((self.landmarks >= 0).sum())
-
-
-@dataclass(kw_only=True)
-class Best:
-    """The best hypothesis so far: for each point its landmark's place or -1."""
-
-    landmarks: list[int]
-    pairs: int = 0
-    cost: float = 0.0
-    effort: Effort = field(default_factory=Effort)
-
-    def beaten_by(self, pairs: int, cost: float) -> bool:
-        """More pairs, or as many at less cost."""
-        return pairs > self.pairs or (pairs == self.pairs and cost < self.cost)
-
-    def keep(self, pairs: list[tuple[int, int]], cost: float) -> None:
-        """Take these pairs (point, landmark) for the best."""
-        self.pairs, self.cost = len(pairs), cost
-        self.landmarks = [-1] * len(self.landmarks)
-        for k, j in pairs:
-            self.landmarks[k] = j

@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from typing import ClassVar
 
-from slam.estimate import Changes, MapSquares, Raster
+from slam.estimate import Changes, Raster
 from slam.shunting.config import ShuntingConfig
 from slam.shunting.map import export
 from slam.shunting.map.network import Network
@@ -41,18 +41,6 @@ class ShuntingSlam(Tracker):
         """
         return export.existence(self.network)
 
-    def map_part(self, bounds: tuple[float, float, float, float]) -> Raster | None:
-        """The same within xmin, ymin, xmax, ymax, m; None for an empty network."""
-        return export.existence(self.network, bounds)
-
-    def map_squares(self) -> MapSquares:
-        """Where neurons live."""
-        return self.network.squares()
-
     def changes(self) -> Changes | None:
         """What appeared and what is gone lately; None without a map or a long-term memory."""
         return export.changes(self.network)
-
-    def changes_part(self, bounds: tuple[float, float, float, float]) -> Changes | None:
-        """The same within xmin, ymin, xmax, ymax, m."""
-        return export.changes(self.network, bounds)

@@ -16,7 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
-from slam.estimate import SQUARE, MapSquares
+from slam.estimate import Raster
 from slam.frontend.visibility import View
 from slam.tracker.cells import (
     ANEW,
@@ -33,7 +33,7 @@ from slam.tracker.windows import dense
 
 MAX_BLOCKS_ACROSS = 1 << 15  # directory edge; 7.8 km at 3 cm cells
 MAX_DIRECTORY = 1 << 26  # entries, 256 MiB: 1.9 km square
-MAX_CELLS = 1 << 28  # of a raster, 1 GiB a layer: 490 m square at 3 cm cells
+MAX_CELLS = 1 << 26  # of a raster, 256 MiB: 245 m square at 3 cm; a larger map has wider cells
 
 
 class CellMap(abc.ABC):
@@ -145,41 +145,20 @@ class CellMap(abc.ABC):
         (i0, j0), (i1, j1) = places.min(axis=0).tolist(), (places.max(axis=0) + 1).tolist()
         return i0 * SIDE, j0 * SIDE, i1 * SIDE, j1 * SIDE
 
-    def squares(self) -> MapSquares:
-        """Where blocks live."""
-        _, places = living(self.cells)
-        found = np.unique(places[:, ::-1] * SIDE // SQUARE, axis=0)
-        return MapSquares(self.cell, found.astype(np.int64))
+    def coarseness(self, extent: tuple[int, int, int, int]) -> int:
+        """How many cells a side are one in a raster of ``extent``, so that it has ``MAX_CELLS``."""
+        i0, j0, i1, j1 = extent
+        n = 1
+        while -(-(i1 - i0) // n) * -(-(j1 - j0) // n) > MAX_CELLS:
+            n += 1
+        return n
 
-    def raster_extent(
-        self, bounds: tuple[float, float, float, float] | None = None
-    ) -> tuple[int, int, int, int] | None:
-        """``extent``, or what lies within ``bounds`` (xmin, ymin, xmax, ymax, m), alive or not.
-
-        Raises ``InvalidValueError`` where a raster of it would exceed ``MAX_CELLS``.
-        """
-        found = self.extent() if bounds is None else self._room()
-        if found is not None and bounds is not None:
-            low = [math.floor(edge / self.cell) for edge in bounds[:2]]
-            high = [math.ceil(edge / self.cell) for edge in bounds[2:]]
-            i0, j0 = max(found[0], low[0]), max(found[1], low[1])
-            i1, j1 = min(found[2], high[0]), min(found[3], high[1])
-            found = (i0, j0, i1, j1) if i0 < i1 and j0 < j1 else None
-        if found is not None:
-            across, along = found[2] - found[0], found[3] - found[1]
-            if across * along > MAX_CELLS:
-                raise InvalidValueError(
-                    f"the map is {across * self.cell:.0f} m x {along * self.cell:.0f} m; as a "
-                    f"raster of {self.cell} m it would have more than {MAX_CELLS} cells"
-                )
-        return found
-
-    def _room(self) -> tuple[int, int, int, int] | None:
-        """Cell indices as of ``extent``, of all places where a block may live."""
-        (rows, columns), (i0, j0) = self.cells.directory.shape, self.cells.corner.tolist()
-        if not rows or not columns:
-            return None
-        return i0 * SIDE, j0 * SIDE, (i0 + columns) * SIDE, (j0 + rows) * SIDE
+    def raster(
+        self, values: NDArray[np.float32], extent: tuple[int, int, int, int], n: int = 1
+    ) -> Raster:
+        """``values`` of the cells of ``extent``, ``n`` a side as one."""
+        origin = np.array([extent[0] * self.cell, extent[1] * self.cell, 0.0])
+        return Raster(values=values, resolution_m=n * self.cell, T_map_origin=origin)
 
     def bytes_per_neuron(self) -> float:
         """Bytes of every array, unused slots and directory included, per cell that is alive."""

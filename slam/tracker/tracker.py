@@ -203,8 +203,8 @@ class Tracker(abc.ABC):
             return None
         short_term, match = self._matcher.reward.short_term, judged.match
         step = min(judged.prediction.elapsed, self.config.map.longest_look_s)
-        turn = len(self._path)
-        return look(self.cell_map, short_term, observations, match.T_map_robot, step, turn)
+        times, turn = (step, self._pose_covariance.unseen_s), len(self._path)
+        return look(self.cell_map, short_term, observations, match.T_map_robot, times, turn)
 
     def _update_map(self, observations: Observations, judged: Judged) -> None:
         """Let the map see the frame, where the pose is believed."""
@@ -232,7 +232,8 @@ class Tracker(abc.ABC):
             left_behind = self._agreement.left_behind(self._dragged)
             self._pose_covariance.dragged(left_behind, self._agreement.covariance(self._dragged))
         if tracked:
-            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m)
+            along_rad = self._pose_covariance.along_rad
+            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m, along_rad)
         else:
             self._odometry_noise.skip()
 

@@ -28,7 +28,13 @@ from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.recent import Standing
-from slam.tracker.uncertainty.covariances import advance, carried, innovation, observable
+from slam.tracker.uncertainty.covariances import (
+    advance,
+    carried,
+    innovation,
+    observable,
+    root_share,
+)
 from slam.tracker.uncertainty.residuals import look
 
 
@@ -48,7 +54,7 @@ def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:
     cell_map, matcher = new_map(config), Matcher(config)
     origin, covariance = np.zeros(3), np.diag([0.1, 0.1, 0.1])
     seen = from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), config)
-    look(cell_map, 0.3, seen, origin, 1.0, 0)
+    look(cell_map, 0.3, seen, origin, (1.0, 0.0), 0)
     whole = [np.eye(3) for _ in range(4)]
     advance(
         whole[0],
@@ -59,11 +65,12 @@ def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:
         covariance,
         covariance,
         (1.0, 1.0, 1.0, 1.0),
-        0.0,
+        covariance,
     )
+    root_share((1.0, 0.0, 1.0), covariance, 1.0, np.eye(2))
     carried(covariance, origin, 0.0, 0.0, np.eye(3))
     observable(covariance, 0.0, 2.0, np.eye(3))
-    innovation(covariance, covariance, covariance, origin, 1.0)
+    innovation(covariance, covariance, covariance, origin, 1.0, (0.0, 0.0))
     for write in (False, True):
         rasterise(cell_map, seen, origin)
         cell_map.integrate(seen.view, origin, 1.0, write=write)

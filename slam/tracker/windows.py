@@ -26,9 +26,19 @@ class Window(NamedTuple):
     blocks: tuple[int, int]
     cells: tuple[slice, slice]
 
-    def spread(self, values: NDArray[np.float32], fill: float) -> NDArray[np.float32]:
-        """The rectangle's cells from ``values`` (n, 8, 8) of its blocks, else ``fill``."""
+    def spread(self, values: NDArray[np.float32], fill: float, n: int = 1) -> NDArray[np.float32]:
+        """The rectangle's cells from ``values`` (n, 8, 8) of its blocks, else ``fill``.
+
+        n  so many cells a side are one, the largest of them; of whole blocks
+        """
         height, width = self.blocks
+        if n > 1:
+            out = np.full((-(-height * SIDE // n), -(-width * SIDE // n)), fill, np.float32)
+            place = np.arange(SIDE)
+            j = (self.rows[:, None, None] * SIDE + place[:, None]) // n
+            i = (self.columns[:, None, None] * SIDE + place) // n
+            np.fmax.at(out, (j, i), values)
+            return out
         out = np.full((height, SIDE, width, SIDE), fill, np.float32)
         out[self.rows, :, self.columns] = values
         return out.reshape(height * SIDE, width * SIDE)[self.cells]

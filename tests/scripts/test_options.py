@@ -32,7 +32,7 @@ from sim.recording.dataset import read_plan, writing
 from sim.recording.recipe import RECIPE, Recipe, read_recipe, write_recipe
 from sim.sensors.lidar.registry import scanner_of
 from sim.twins.absence import Change
-from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.errors import InvalidValueError, LogFormatError
 
 ONE = {"scene": "arena", "seed": 1, "dynamism": 0.5, "seconds": 1.0}
 
@@ -74,8 +74,6 @@ def test_a_dataset_of_one_motion_reads_back_and_sweeps_change(tmp_path: Path):
     assert list(plan.planned()) == ["arena-d0-m0.25-s0001", "arena-d1-m0.25-s0001"]
     with writing(tmp_path, plan):
         assert read_plan(tmp_path) == plan
-    with pytest.raises(InvalidValueError, match="all levels are the same"):
-        DatasetPlan(recipe=Recipe(**ONE, motion=0.2, change=0.1), dynamisms=(0.0, 1.0), episodes=1)
 
 
 def test_the_axis_is_what_has_several_levels():
@@ -87,13 +85,9 @@ def test_the_axis_is_what_has_several_levels():
     assert axis_levels(None, ["0.8"], None, ["0", "4"]) == ("people", (0.0, 4.0), {"motion": 0.8})
     assert Axis(name="people").at(4.0) == {"dynamism": 0.0, "motion": 0.5, "change": None}
     assert Axis(name="people").crowd(4.0) == "escorts:4"
-    for level in (1.5, -1.0, 81.0):
+    for level in (1.5, -1.0):
         with pytest.raises(InvalidValueError, match=f"--people must be .*0..80, got {level:g}"):
             Axis(name="people").crowd(level)
-    with pytest.raises(InvalidValueError, match="--motion and --change"):
-        axis_levels(None, ["0", "1"], ["0", "1"])
-    with pytest.raises(InvalidValueError, match="--dynamism sets both"):
-        axis_levels(["0.5"], ["0", "1"], None)
 
 
 def test_levels_of_one_axis_leave_the_other_at_0_or_as_it_is_held():
@@ -194,8 +188,6 @@ def test_plans_take_names_and_refuse_what_is_none() -> None:
     some = {"slams": ("odometry",), "scenes": ("arena",), "levels": (0.0,), "seeds": (1,)}
     plan = Plan(**some, seconds=10.0, every=1, scanner="rplidar_a1:noise")
     assert plan.recipe(plan.runs()[0]).laser() == scanner_of("rplidar_a1:noise")
-    with pytest.raises(UnknownNameError, match="Did you mean 'rplidar_a1'"):
-        Plan(**some, scanner="rplidar_a2")
     with pytest.raises(InvalidValueError, match=r"one scan in 8 of 5\.5 a second has 1"):
         Plan(**some, seconds=1.0, every=8, scanner="rplidar_a1")
 

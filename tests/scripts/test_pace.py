@@ -24,10 +24,13 @@ def test_what_ran_before_tells_how_long_it_takes(capsys):
     assert pace.estimate(works, processes=2) == pytest.approx(60.0)  # the longer one alone
     assert pace.estimate([Work("run b", 1.0)]) == pytest.approx(2.0)  # like the others
     assert pace.estimate([Work("walk a")]) is None
-    pace.learn([(Work("run a", 5.0), 5.0)])
-    assert pace.rates()["run a"] == pytest.approx(0.6 * 2.0 + 0.4 * 1.0)
+    pace.learn([(Work("run a", 5.0), 15.0)])  # a slower one counts in part
+    assert pace.rates()["run a"] == pytest.approx(0.6 * 2.0 + 0.4 * 3.0)
+    pace.learn([(Work("run a", 5.0), 8.0)])  # a faster one at once
     pace.announce("two runs", works)
     assert capsys.readouterr().out == "Ahead: two runs; about 65 s.\n"
+    pace.learn([(Work("run b", 1.0), 1.0), (Work("run c", 1.0), 9.0)])
+    assert pace.estimate([Work("run d", 1.0)]) == pytest.approx(1.6)
     assert pace.estimate([]) == 0.0
 
 

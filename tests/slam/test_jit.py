@@ -12,9 +12,10 @@ import sys
 from pathlib import Path
 
 import numba
+import numpy as np
 import pytest
 
-from slam._jit import announced
+from slam._jit import announced, inner, uncounted
 
 CALLEE = """
 from slam._jit import {} as jit
@@ -46,6 +47,27 @@ def run(folder: Path, decorator: str, step: float, callee: str = CALLEE) -> floa
         env=env,
     )
     return float(done.stdout)
+
+
+def test_a_kernel_that_counts_no_references_may_neither_allocate_nor_return_an_array():
+    for kernel in (lambda table: np.zeros(2)[0], lambda table: table[0]):
+        with pytest.raises(numba.core.errors.TypingError):
+            uncounted(kernel)(np.zeros((2, 3)))
+
+
+def test_a_kernel_that_counts_no_references_leaves_its_arguments_alone():
+    @inner
+    def first_of(row):
+        return row[0]
+
+    @uncounted
+    def total(tables):
+        return first_of(tables[0][1]) + first_of(tables[1])
+
+    tables = (np.ones((2, 3)), np.ones(3))
+    before = [sys.getrefcount(table) for table in tables]
+    assert [total(tables) for _ in range(100)] == [2.0] * 100
+    assert [sys.getrefcount(table) for table in tables] == before
 
 
 @pytest.mark.parametrize("decorator", ["njit", "inner"])

@@ -76,6 +76,21 @@ def test_a_crowd_in_front_of_half_of_the_walls_does_not_make_it_lost():
     assert drive(hidden=0.5) < 0.02
 
 
+@pytest.mark.parametrize("moved", [(0.1, 0.0, 1.0), (2.5, 1.8, -2.0)], ids=["turned", "carried"])
+def test_a_pose_at_which_beams_pass_through_walls_is_looked_for_again(moved):
+    """The wheels notice nothing, and somebody hides a third of the walls."""
+    world, oracle = room(), MapOracle()
+    oracle.know(world, START)
+    for k, truth in enumerate((np.zeros(3), np.zeros(3), np.array(moved))):
+        ranges = scan_at(se2.compose(START, truth), world)
+        ranges[20:80] = np.minimum(ranges[20:80], 0.6)
+        scan = Scan(stamp_ns=k * 10**8, ranges=ranges.astype(np.float32), spec=SPEC)
+        wheels = Odometry(stamp_ns=k * 10**8, T_odom_robot=np.zeros(3))
+        said = oracle.update(Frame(stamp_ns=k * 10**8, odometry=wheels, scan=scan))
+    assert said.converged
+    assert np.abs(se2.between(truth, said.T_map_robot)).max() < 0.03
+
+
 def test_it_is_a_control_that_must_be_shown_the_map():
     oracle = slam.create("oracle(map)")
     frame = Frame(

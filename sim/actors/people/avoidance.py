@@ -14,7 +14,7 @@ from sim.actors.people import columns
 from sim.actors.people.right_of_way import BODY, Addresses, Crowd, Doors, Float, Int
 from sim.core.flow import Field, clearance_at
 from sim.core.state import Record, Records
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 
 SIGHT_M = ACTORS.holding.sight_m
 
@@ -96,7 +96,7 @@ HELD_SPARE, HELD_BRAKE = _S.held_spare_m, _S.held_brake
 CROWD_SPARE, CROWD_BRAKE = _S.crowd_spare_m, _S.crowd_brake
 
 
-@njit
+@uncounted
 def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> float:
     """s until a point moving at (wx, wy) is within ``reach`` of (dx, dy); HORIZON if later."""
     c = dx * dx + dy * dy - reach * reach

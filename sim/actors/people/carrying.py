@@ -8,8 +8,6 @@ from __future__ import annotations
 
 import math
 
-import numpy as np
-
 from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
@@ -113,18 +111,15 @@ def runs_into(  # noqa: PLR0913 (kernel)
 
 
 @inner
-def pushes(
-    i: int,
-    wanted: tuple[float, float],
-    near: Int,
-    field: Field,
-    crowd: Crowd,
+def pushes(  # noqa: PLR0913 (kernel)
+    i: int, wanted: tuple[float, float], near: Int, field: Field, crowd: Crowd, rows: Int,
     held: Held | None,
-) -> tuple[float, float]:
+) -> tuple[float, float]:  # fmt: skip
     """The velocity of someone who pushes a long thing, by the dynamic window of a long vehicle.
 
     They walk round it to turn it, about its middle; where there is no room for that they pull it
     back. What stands in the way of any part of it is waited for, but chairs are pushed along.
+    rows: scratch.
     """
     if held is None:
         return wanted
@@ -132,7 +127,6 @@ def pushes(
     crowd.state[i].look = yaw
     if pace < 0.05:
         return 0.0, 0.0
-    rows = np.empty(8, dtype=np.int64)
     parts = rows[: parts_of(i, crowd, rows)]
     discs, goal = crowd.discs, crowd.task[i].goal
     me, tip, pivot = discs[i], discs[parts[1]], discs[crowd.task[i].held]

@@ -12,8 +12,6 @@ from __future__ import annotations
 import math
 from typing import NamedTuple
 
-import numpy as np
-
 from sim.actors.config import ACTORS
 from sim.actors.holding import Held
 from sim.actors.people import columns
@@ -53,6 +51,7 @@ _W = ACTORS.walking
 _S = ACTORS.steering
 STILL = _W.still_mps
 NEAR, CROWD_NEAR = 24, 64  # discs around one that are looked at, without and with a crowd
+PARTS = 8  # most discs of one and of what it pushes
 LANE_HALF, LANE, LANE_SIDE, LANE_WALL = _S.lane_half_m, _S.lane, _S.lane_side_m, _S.lane_wall_m
 TURN_GAIN = _W.turn_gain
 
@@ -70,6 +69,7 @@ class People(NamedTuple):
     hulls    what of the model follows who sits
     leaders  who is followed; held  who holds what
     weights  (k, 2) mass kg and yaw inertia kg m2 of each planar disc row
+    scratch  (CROWD_NEAR + PARTS,) disc rows, for one person at a time
     """
 
     alive: bool
@@ -86,6 +86,7 @@ class People(NamedTuple):
     leaders: Leaders
     held: Held
     weights: Float
+    scratch: Int
 
 
 @inner
@@ -209,8 +210,11 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
     qpos, qvel, ctrl = physics
     at, field, ways, crowd = people.at, people.field, people.ways, people.crowd
     servos = people.servos
-    crowded = (crowd.state["dense"] < 1.0).any()
-    near = np.zeros(CROWD_NEAR if crowded else NEAR, dtype=np.int64)
+    most = NEAR
+    for i in range(len(servos)):
+        if crowd.state[i].dense < 1.0:
+            most = CROWD_NEAR
+    near, parts = people.scratch[:most], people.scratch[CROWD_NEAR:]
     sense(at, qpos, qvel, ways, crowd)
     note_ways(tick, people.leaders, crowd)
     spread_out(field, people.leaders, crowd)
@@ -227,7 +231,7 @@ def decide(clock: tuple[float, float], physics: tuple[Float, Float, Float], peop
         count = nearby(i, crowd, ways.sides, near)
         fade = patience(i, time, crowd)
         if is_pushing(i, crowd):
-            vx, vy = pushes(i, wanted, near[:count], field, crowd, people.held)
+            vx, vy = pushes(i, wanted, near[:count], field, crowd, parts, people.held)
         else:
             vx, vy = choose(i, wanted, near[:count], fade, field, crowd)
         before = vx * vx + vy * vy

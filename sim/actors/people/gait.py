@@ -15,7 +15,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.core.state import Records
-from slam._jit import inner, njit
+from slam._jit import inner, njit, uncounted
 
 Float = NDArray[np.float64]
 Int = NDArray[np.int64]
@@ -56,19 +56,24 @@ def swung(phase: float) -> float:
 def pick_foot(p: Float, pose: tuple[float, float, float], vx: float, vy: float) -> int:
     """The foot to lift now, -1: none. Walking: in turns; standing: one that is out of place."""
     x, y, yaw = pose
-    lag = np.zeros(2)
-    away = np.zeros(2)
-    for foot in range(2):
-        rx, ry = rest_foot(x, y, yaw, foot)
-        dx, dy = p[FEET + 2 * foot] - rx, p[FEET + 2 * foot + 1] - ry
-        away[foot] = math.sqrt(dx * dx + dy * dy)
-        lag[foot] = -(dx * vx + dy * vy)
+    away, lag = _behind(p, (x, y, yaw), vx, vy, 0)
+    away_right, lag_right = _behind(p, (x, y, yaw), vx, vy, 1)
     if vx * vx + vy * vy > 0.0225:
-        if away[0] > 0.45 or away[1] > 0.45 or abs(lag[0] - lag[1]) > 0.02:
-            return 0 if lag[0] > lag[1] else 1
+        if away > 0.45 or away_right > 0.45 or abs(lag - lag_right) > 0.02:
+            return 0 if lag > lag_right else 1
         return 1 - int(p[LAST])
-    worst = 0 if away[0] > away[1] else 1
-    return worst if away[worst] > 0.07 else -1
+    worst = 0 if away > away_right else 1
+    return worst if max(away, away_right) > 0.07 else -1
+
+
+@inner
+def _behind(
+    p: Float, pose: tuple[float, float, float], vx: float, vy: float, foot: int
+) -> tuple[float, float]:
+    """m by which a foot is out of its place at rest, and m * m/s by which it lags the motion."""
+    rx, ry = rest_foot(pose[0], pose[1], pose[2], foot)
+    dx, dy = p[FEET + 2 * foot] - rx, p[FEET + 2 * foot + 1] - ry
+    return math.sqrt(dx * dx + dy * dy), -(dx * vx + dy * vy)
 
 
 @inner
@@ -116,10 +121,10 @@ def pose_leg(
     hip: tuple[float, float, float],
     yaw: float,
     foot: tuple[float, float, float],
-    pos: Float,
-    quat: Float,
+    rows: tuple[int, int],
+    mocap: tuple[Float, Float],
 ) -> None:
-    """Thigh and shank from hip and foot: rows 0 and 1 of ``pos`` (2, 3) and ``quat`` (2, 4).
+    """Thigh and shank from hip and foot: ``rows`` of positions and quaternions ``mocap``.
 
     The hip sinks a little where a long step asks for it, as a pelvis does.
     """
@@ -138,10 +143,11 @@ def pose_leg(
     kx, ky, kz = 1.0 - ux * ux, -ux * uy, -ux * uz  # the knee bends forwards
     norm = math.sqrt(kx * kx + ky * ky + kz * kz)
     nx, ny, nz = a * ux + h * kx / norm, a * uy + h * ky / norm, a * uz + h * kz / norm
-    pos[0, 0], pos[0, 1], pos[0, 2] = hip[0], hip[1], top
-    pos[1, 0], pos[1, 1], pos[1, 2] = hip[0] + c * nx - s * ny, hip[1] + s * nx + c * ny, top + nz
-    quaternion(yaw, -nx / THIGH, -ny / THIGH, -nz / THIGH, quat[0])
-    quaternion(yaw, (nx - fx) / SHANK, (ny - fy) / SHANK, (nz - fz) / SHANK, quat[1])
+    thigh, shank = mocap[0][rows[0]], mocap[0][rows[1]]
+    thigh[0], thigh[1], thigh[2] = hip[0], hip[1], top
+    shank[0], shank[1], shank[2] = hip[0] + c * nx - s * ny, hip[1] + s * nx + c * ny, top + nz
+    quaternion(yaw, -nx / THIGH, -ny / THIGH, -nz / THIGH, mocap[1][rows[0]])
+    quaternion(yaw, (nx - fx) / SHANK, (ny - fy) / SHANK, (nz - fz) / SHANK, mocap[1][rows[1]])
 
 
 @njit
@@ -155,7 +161,7 @@ def stand(qpos: Float, addresses: Int, feet: Float) -> None:
         feet[i, SWING] = -1.0
 
 
-@njit
+@uncounted
 def walk(  # noqa: PLR0913 (kernel)
     dt: float,
     physics: tuple[Float, Float],
@@ -175,7 +181,6 @@ def walk(  # noqa: PLR0913 (kernel)
     mocap      positions and quaternions, written
     """
     qpos, qvel = physics
-    pos, quat = np.zeros((2, 3)), np.zeros((2, 4))
     for i in range(feet.shape[0]):
         q, v = addresses[i]
         pose = (qpos[q], qpos[q + 1], qpos[q + 2])
@@ -192,10 +197,5 @@ def walk(  # noqa: PLR0913 (kernel)
             lift = LIFT * math.sin(math.pi * p[PHASE] ** 0.7) if p[SWING] == foot else 0.0
             place = (p[FEET + 2 * foot], p[FEET + 2 * foot + 1], SOLE + lift)
             x, y = rest_foot(pose[0], pose[1], pose[2], foot)
-            pose_leg((x, y, height), pose[2], place, pos, quat)
-            for link in range(2):
-                row = limbs[i, 2 * foot + link]
-                for k in range(3):
-                    mocap[0][row, k] = pos[link, k]
-                for k in range(4):
-                    mocap[1][row, k] = quat[link, k]
+            rows = (limbs[i, 2 * foot], limbs[i, 2 * foot + 1])
+            pose_leg((x, y, height), pose[2], place, rows, mocap)

@@ -110,6 +110,7 @@ class People:
             leaders=self._give_roles(_planar(bodies, self.names), scene),
             held=holding.hands(model, bodies, scene, self._cleaners),
             weights=_weights(model, _planar(bodies, self.names)),
+            scratch=np.zeros(crowd.CROWD_NEAR + crowd.PARTS, dtype=np.int64),
         )
 
     def _give_roles(  # noqa: C901 (one branch for each kind of role)

@@ -23,7 +23,7 @@ from sim.actors.people.right_of_way import Crowd, Float, Int
 from sim.core.draws import between, uniform, waiting
 from sim.core.flow import FAR, Field, clearance_at, time_at
 from sim.core.state import Records
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 
 _S = ACTORS.sitting
 SHARE, HAND, STAY, DOWN_S = _S.share, _S.hand_m, _S.stay, _S.down_s
@@ -47,7 +47,7 @@ class Hulls(NamedTuple):
     body_pos: Float
 
 
-@njit
+@uncounted
 def dress(crowd: Crowd, hulls: Hulls) -> None:
     """Who has a chair, and no longer walks to it, meets walls, people and doors only; and sinks."""
     for i in range(len(hulls.geoms)):

@@ -200,7 +200,8 @@ class Raycaster:
         self.fan = np.zeros((m, col.N_BEAM))
         self._work = (
             self.fan, np.zeros((plan.ends.size - 1, col.N_FAN)), np.zeros(shape[:2]),
-            np.zeros((n, col.N_WINDOW)), np.zeros(n, dtype=np.int64), np.zeros(n, dtype=np.int64),
+            np.zeros((n, col.N_WINDOW)), np.zeros(n, dtype=np.int64),
+            np.zeros(n + windows.BUCKETS + 1, dtype=np.int64),
         )  # fmt: skip
 
     def mirror(self, polished: NDArray[np.bool_], out: Hits) -> None:

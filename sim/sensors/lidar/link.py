@@ -1,11 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What reaches the computer: single mirror turns as messages, and the serial link's losses.
+"""What reaches the computer by the LMS-221's serial line, and what is lost.
 
-``partial_scans``: for 180 degrees finer than 1 degree the ROS driver (STW, ros-drivers/
-sicktoolbox_wrapper) publishes each turn of the mirror as a message of its own: 1 degree steps,
-``angle_min`` shifted by the turn's offset. For smaller fields of view it publishes whole scans.
-
-``SerialLink``: 10 bits a byte; the device measures on while it sends, and the next scan sent is
+10 bits a byte; the device measures on while it sends, and the next scan sent is
 the first that begins after the last byte has left. Telegram sizes are TL table 10-16. Lost scans
 computed that way are those printed in TL table 10-17 for 9.6 and 38.4 kBd in all three modes of
 whole scans; 19.2 kBd is inferred from the same rule. At 500 kBd (RS 422) nothing is lost: at most
@@ -19,11 +15,9 @@ from collections.abc import Iterable, Iterator
 from dataclasses import dataclass
 from types import MappingProxyType
 
-import numpy as np
-
 from sim.sensors.lidar.models.lms221 import TURNS_PER_S, Lms221Config
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, Frame, LaserSpec, Scan
+from slam.frames import NS_PER_S, Frame
 from slam.frontend.odometry_steps import MotionSum
 
 BITS_PER_BYTE = 10  # TL 4.1
@@ -112,47 +106,3 @@ def over_link(frames: Iterable[Frame], link: SerialLink) -> Iterator[Frame]:
         motion.add(frame.odometry)
         if link.sends(index):
             yield motion.passed_on(frame)
-
-
-def partial_spec(spec: LaserSpec, config: Lms221Config, turn: int) -> LaserSpec:
-    """Geometry of the message of one turn of the mirror; times from the first beam of that turn."""
-    mine = np.flatnonzero(config.scanner().turn_of == turn)
-    offsets = spec.beam_time_offsets[mine]
-    return LaserSpec(
-        n_beams=mine.size,
-        angle_min=spec.angle_min + int(mine[0]) * spec.angle_increment,
-        angle_increment=config.turns * spec.angle_increment,
-        range_min=spec.range_min,
-        range_max=spec.range_max,
-        beam_time_offsets=offsets - offsets[0],
-        T_robot_laser=spec.T_robot_laser,
-        range_sigma_m=spec.range_sigma_m,
-    )
-
-
-def partial_scans(scan: Scan, config: Lms221Config) -> list[Scan]:
-    """The messages that the ROS driver makes of one scan, in order of time.
-
-    One for each turn over 180 degrees; the whole scan for 100 degrees, as the driver does (STW).
-    Stamps are those of the earliest beam of each message.
-    """
-    scanner = config.scanner()
-    if scan.spec.n_beams != scanner.n_beams:
-        raise InvalidValueError(
-            f"partial_scans: the scan has {scan.spec.n_beams} beams, "
-            f"expected {scanner.n_beams} as of the config"
-        )
-    if config.fov_deg != 180 or config.turns == 1:
-        return [scan]
-    messages = []
-    for turn in range(config.turns):
-        mine = np.flatnonzero(scanner.turn_of == turn)
-        first_ns = round(float(scan.spec.beam_time_offsets[mine[0]]) * NS_PER_S)
-        messages.append(
-            Scan(
-                stamp_ns=scan.stamp_ns + first_ns,
-                ranges=scan.ranges[mine],
-                spec=partial_spec(scan.spec, config, turn),
-            )
-        )
-    return messages

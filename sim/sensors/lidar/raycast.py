@@ -16,7 +16,7 @@ from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, lay_fans, ray_wedge
 from sim.sensors.lidar.ray_shapes import Pose, face_normal, meet
 from sim.sensors.lidar.windows import enclose, find_windows, nearest_first
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 
 Ray = tuple[Vec3, Vec3]
 AWAY = 1e-6  # m from a mirror at which what it shows begins, so that it does not show itself
@@ -147,7 +147,7 @@ def _cast_windows(  # noqa: PLR0913, PLR0915 (kernel)
                 farthest[layer, i] = worst
 
 
-@njit
+@uncounted
 def sweep(  # noqa: PLR0913 (kernel)
     table: Float,
     runs: Int,
@@ -173,7 +173,7 @@ def sweep(  # noqa: PLR0913 (kernel)
     rays     of a beam
     optics   height of the scan plane m, aperture radius m, half divergence rad
     work     room for the fans, their frames, reach of the beams (layers, m), windows, their owners
-             (3 n,) and order (3 n,)
+             (3 n,) and order (3 n + BUCKETS + 1,)
     out      (layers, m, k) each: ranges m, inf for a miss; index of the candidate, -1; |cos| of
              the incidence, NaN
     """
@@ -217,7 +217,7 @@ def cast_one(  # noqa: PLR0913 (kernel)
     return best, hit, cosine
 
 
-@njit
+@uncounted
 def reflect(  # noqa: PLR0913 (kernel)
     table: Float,
     polished: NDArray[np.bool_],

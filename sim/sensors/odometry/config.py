@@ -8,38 +8,28 @@ import math
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from sim.core.checks import check_not_negative, check_types
 from slam.errors import UnknownNameError
+from slam.settings import Settings, number
 
 
 @dataclass(frozen=True, kw_only=True)
-class OdometryConfig:
+class OdometryConfig(Settings):
     """How wrong the wheels are. Deviations are of one run among many, or after one unit of motion.
 
-    diameter_ratio_std  of Ed - 1        track_std  of Eb - 1        scale_std  of Es - 1
-    trans_std_per_m     m after 1 m      trans_std_per_rad  m after 1 rad
-    rot_std_per_m       rad after 1 m    rot_std_per_rad    rad after 1 rad
-    side_std_per_m      m after 1 m, sideways; no encoder sees it
-    slip_per_m          slip events per metre driven: the heading jumps by 1..3 degrees
-    slip_per_contact_m  the same per metre driven while touching something
-    ticks_per_m         encoder ticks per metre of rim travel, 0 for no quantisation
+    Sideways motion is seen by no encoder. A slip turns the heading by 1 to 3 degrees.
     """
 
-    diameter_ratio_std: float = 0.0
-    track_std: float = 0.0
-    scale_std: float = 0.0
-    trans_std_per_m: float = 0.0
-    trans_std_per_rad: float = 0.0
-    rot_std_per_m: float = 0.0
-    rot_std_per_rad: float = 0.0
-    side_std_per_m: float = 0.0
-    slip_per_m: float = 0.0
-    slip_per_contact_m: float = 0.0
-    ticks_per_m: float = 0.0
-
-    def __post_init__(self) -> None:
-        check_types(self)
-        check_not_negative(self)
+    diameter_ratio_std: float = number(0.0, "ratio", "of Ed - 1")
+    track_std: float = number(0.0, "ratio", "of Eb - 1")
+    scale_std: float = number(0.0, "ratio", "of Es - 1")
+    trans_std_per_m: float = number(0.0, "m", "after 1 m")
+    trans_std_per_rad: float = number(0.0, "m", "after 1 rad")
+    rot_std_per_m: float = number(0.0, "rad", "after 1 m")
+    rot_std_per_rad: float = number(0.0, "rad", "after 1 rad")
+    side_std_per_m: float = number(0.0, "m", "after 1 m, sideways")
+    slip_per_m: float = number(0.0, "1/m", "slips per metre driven")
+    slip_per_contact_m: float = number(0.0, "1/m", "the same while touching something", high=1e12)
+    ticks_per_m: float = number(0.0, "1/m", "of rim travel; 0: no quantisation", high=1e12)
 
 
 PRESETS = MappingProxyType(

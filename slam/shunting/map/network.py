@@ -1,25 +1,222 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The shunting network, Eq. (8): a map whose cells are neurons.
+"""The shunting network, Eq. (8): a map whose cells are neurons, and a running mean of their input.
 
+The short-term mean is the activity x of Eq. (8), which leaks; the long-term one is no part of it.
 Blocks of neurons are born under an observation and die when every neuron in them is silent.
 """
 
 from __future__ import annotations
 
 import math
+from typing import NamedTuple
 
-from slam.shunting.config import ShuntingConfig
-from slam.tracker.two_memories import TwoMemories
+import numpy as np
+from numpy.typing import NDArray
+
+from slam._jit import inner, njit
+from slam.frontend.surfaces import opposite
+from slam.frontend.visibility import View, block_is_hidden, seen_empty
+from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import (
+    ANEW,
+    FREE_COUNT,
+    MASK,
+    SHIFT,
+    SIDE,
+    Cells,
+    Look,
+    fresh,
+    in_reach,
+)  # fmt: skip
+from slam.tracker.config import TrackerConfig
 
 
-class Network(TwoMemories):
-    """The plane of neurons, with the lateral weights of its config."""
+class Law(NamedTuple):
+    """The constants of one update.
 
-    config: ShuntingConfig
+    step        h, s: how long the present input acts on x
+    look        s: what this look adds to a trace's age
+    pace        s: prior age of a trace, so that its first looks do not count fully
+    oldest      s: age at which a trace stops growing stiffer
+    decay       A, 1/s
+    threshold   sigma
+    mu          w = mu / d; 0: no lateral weights
+    reach       r0, cells
+    trace       whether a long-term trace is kept
+    faded       a trace below ends where the input is below ``unseen``
+    known_s     s of looking after which half of a trace counts as long known
+    """
 
-    def __init__(self, config: ShuntingConfig) -> None:
+    step: float
+    look: float
+    pace: float
+    oldest: float
+    decay: float
+    threshold: float
+    mu: float
+    reach: float
+    trace: bool
+    faded: float
+    unseen: float
+    known_s: float
+
+
+@inner
+def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
+    """Sum of w_ij d(x_j) over the neighbours of neuron (i, j), d(x) = max(x - sigma, 0)."""
+    edge = math.ceil(law.reach)
+    rows, columns = cells.directory.shape
+    total = 0.0
+    for b in range(j - edge, j + edge + 1):
+        for a in range(i - edge, i + edge + 1):
+            d = math.sqrt((a - i) * (a - i) + (b - j) * (b - j))
+            row, column = (b >> SHIFT) - cells.corner[1], (a >> SHIFT) - cells.corner[0]
+            if 0.0 < d < law.reach and 0 <= row < rows and 0 <= column < columns:
+                slot = cells.directory[row, column]
+                above = cells.x[slot, b & MASK, a & MASK] - law.threshold if slot >= 0 else 0.0
+                if above > 0.0:
+                    total += law.mu / d * above
+    return total
+
+
+@njit
+def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
+    cells: Cells,
+    view: View,
+    T_map_laser: NDArray[np.float64],
+    cell: float,
+    law: Law,
+    write: bool,
+    counted: NDArray[np.uint8],
+) -> Look:
+    """One semi-implicit Gauss-Seidel sweep of Eq. (8) over the neurons in view.
+
+    ``write`` False only looks. Impressions are consumed (their scratch is released) when written.
+    ``counted``: see ``cells.Look``.
+    """
+    confirmed, contradicted, visited = 0.0, 0.0, 0
+    known, through = 0.0, 0.0
+    once = counted.shape[1] > 0
+    ox, oy = T_map_laser[0], T_map_laser[1]
+    c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
+    size = SIDE * cell
+    half = 0.71 * size
+    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
+    for row in range(first_row, last_row):
+        for column in range(first_column, last_column):
+            slot = cells.directory[row, column]
+            if slot < 0:
+                continue
+            scratch = cells.scratch_of[slot]
+            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
+            bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
+            if scratch < 0 and block_is_hidden(view, c * bx + s * by, c * by - s * bx, half):
+                continue
+            alive = False
+            for jj in range(SIDE):
+                for ii in range(SIDE):
+                    x, y = cells.x[slot, jj, ii], cells.y[slot, jj, ii]
+                    given = cells.impression[scratch, jj, ii] if scratch >= 0 else np.float32(0.0)
+                    if x == 0.0 and y == 0.0 and given == 0.0:
+                        continue
+                    faced = cells.faced[scratch, jj, ii] if scratch >= 0 else 0
+                    behind = given > 0.0 and opposite(int(faced), cells.facing[slot, jj, ii])
+                    if behind and given <= y:  # the back of a known surface is hidden
+                        alive = True
+                        continue
+                    if given == 0.0:
+                        px = (i0 + ii + 0.5) * cell - ox
+                        py = (j0 + jj + 0.5) * cell - oy
+                        if not seen_empty(view, c * px + s * py, c * py - s * px):
+                            alive = True
+                            continue
+                        contradicted += y
+                        weight = (
+                            y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
+                        )
+                        through += fresh(counted, once, 1, slot, jj, ii, weight)
+                    elif not behind:
+                        confirmed += y * given
+                        weight = (
+                            y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
+                        )
+                        known += fresh(counted, once, 0, slot, jj, ii, weight * given)
+                    visited += 1
+                    if not write:
+                        continue
+                    # Eq. (8), implicit in x: stays in [0, 1) for any step
+                    E = float(given)
+                    if law.mu > 0.0:
+                        E += lateral(cells, law, i0 + ii, j0 + jj)
+                    x = np.float32((x + law.step * E) / (1.0 + law.step * (law.decay + E)))
+                    # Silent is what is small and does not rise: at 37.5 Hz one step is tiny.
+                    if x < law.threshold and law.threshold * (law.decay + E) > E:
+                        x = np.float32(0.0)
+                    cells.x[slot, jj, ii] = x
+                    if law.trace:
+                        age = cells.age[slot, jj, ii]
+                        y = np.float32(y + (given - y) * law.look / (age + law.look + law.pace))
+                        age = np.float32(min(age + law.look, law.oldest))
+                        if y < law.faded and given < law.unseen:
+                            y, age = np.float32(0.0), np.float32(0.0)
+                        cells.y[slot, jj, ii] = y
+                        cells.age[slot, jj, ii] = age
+                        if faced != 0 or y == 0.0:
+                            cells.facing[slot, jj, ii] = faced
+                    if x > 0.0 or y > 0.0:
+                        alive = True
+            if write and not alive:
+                cells.directory[row, column] = -1
+                cells.free[cells.counts[FREE_COUNT]] = slot
+                cells.counts[FREE_COUNT] += 1
+    return Look(confirmed, contradicted, visited, known * cell, through * cell)
+
+
+class Network(CellMap):
+    """The plane of neurons; the loops of the occupancy grid draw key frames in one without weights.
+
+    mu  scale of the lateral weights w = mu / d of Eq. (8); 0: none
+    """
+
+    def __init__(self, config: TrackerConfig, *, lateral: bool = True) -> None:
         super().__init__(config)
-        self.mu = lateral_mu(config.lateral_sum, config.lateral_reach_cells)
+        reach = config.lateral_reach_cells
+        self.mu = lateral_mu(config.lateral_sum, reach) if lateral else 0.0
+
+    def law(self, step: float) -> Law:
+        """Constants of an update whose input acts for ``step`` s (the time since the last scan)."""
+        numbers = self.config.map
+        pace = self.pace(step)
+        return Law(
+            step=step,
+            look=step,
+            pace=pace,
+            oldest=numbers.oldest_paces * pace,
+            decay=self.config.decay_per_s,
+            threshold=self.config.threshold,
+            mu=self.mu,
+            reach=self.config.lateral_reach_cells,
+            trace=self.config.trace_s > 0.0,
+            faded=numbers.faded,
+            unseen=numbers.unseen,
+            known_s=numbers.known_s,
+        )
+
+    def integrate(
+        self,
+        view: View,
+        T_map_laser: NDArray[np.float64],
+        step: float,
+        *,
+        write: bool,
+        counted: NDArray[np.uint8] = ANEW,
+    ) -> Look:
+        """Take the present impressions in for ``step`` s; see the kernel of the same name."""
+        law = self.law(step)
+        result = integrate(self.cells, view, T_map_laser, self.cell, law, write, counted)
+        if write:
+            self.release()
+        return result
 
 
 def lateral_mu(total: float, reach: float) -> float:

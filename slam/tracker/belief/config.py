@@ -7,7 +7,7 @@ from dataclasses import dataclass
 
 from slam.settings import Settings, number
 
-FITTED = "scripts.integrity.fit, training tracks and logs (docs/belief.md)"
+FITTED = "scripts.integrity.fit (docs/belief.md)"
 READ_OFF = "quantiles at right poses and after kidnaps, scripts.integrity.fit"
 
 
@@ -16,7 +16,7 @@ class BeliefConfig(Settings):
     """Evidence in nats, priors as rates: docs/belief.md."""
 
     confirmed: float = number(
-        6.9, "nats", "a: of long-known surface C that scans confirm from a place, a log(1 + C / c)",
+        4.4, "nats", "a: of long-known surface C that scans confirm from a place, a log(1 + C / c)",
         FITTED,
     )  # fmt: skip
     confirmed_m: float = number(0.94, "m", "c: less than it may be confirmed by chance", FITTED,
@@ -28,16 +28,16 @@ class BeliefConfig(Settings):
         0.15, "m/m", "of what is seen through, added to c: a wrong place confirms and contradicts",
     )  # fmt: skip
     through_per_m: float = number(
-        6.2, "nats/m", "b: of long-known surface that they see through", FITTED, low=1e-3
+        3.1, "nats/m", "b: of long-known surface that they see through", FITTED, low=1e-3
     )
     outdated: float = number(
-        5.9, "nats", "price of a room that has changed: b to there, changed_per_m beyond", FITTED
+        2.7, "nats", "price of a room that has changed: b to there, changed_per_m beyond", FITTED
     )
     changed_per_m: float = number(
         0.49, "nats/m", "of long-known surface that is seen through in such a room", FITTED
     )
     broken: float = number(
-        7.0, "nats", "that it costs if hardly a return goes on from the scans before", low=1e-3
+        8.5, "nats", "that it costs if hardly a return goes on from the scans before", low=1e-3
     )
     goes_on: float = number(
         0.5, "share", "of what all returns matched in the second before: a scan goes on", READ_OFF
@@ -48,14 +48,14 @@ class BeliefConfig(Settings):
     pulled_m: float = number(0.2, "m", "by which movers pull a match, unlike a slip", low=1e-6)
     pulled_rad: float = number(0.1, "rad", "the same of its turn", low=1e-6)
     nearby_per_m: float = number(
-        16.0, "nats/m", "of trace that a scan confirms more from a place nearby than from where "
+        7.9, "nats/m", "of trace that a scan confirms more from a place nearby than from where "
         "motion led", FITTED,
     )  # fmt: skip
     place: float = number(
-        5.9, "nats", "a place found must explain: the best of all is better than any one", FITTED
+        5.0, "nats", "a place found must explain: the best of all is better than any one", FITTED
     )
     searched: float = number(
-        3.1, "nats", "evidence of a search that is done: what it did not find is not there", FITTED
+        4.0, "nats", "evidence of a search that is done: what it did not find is not there", FITTED
     )
     unsearched: float = number(
         8.0, "nats", "that a place explains which a search not done may still find, after a break",

@@ -31,6 +31,7 @@ from slam.tracker.tracking.keys import KeyFrame
 DRAWN = 1  # the unit
 MATCHED = 3
 SEARCHED = 16
+KEPT = 64  # submaps; half a MB each at 3 cm and 180 beams
 
 
 def draw(cell_map: CellMap, key: KeyFrame, pose: Float, look_s: float) -> None:
@@ -70,8 +71,9 @@ class Closures:
         self._coarse = coarse(config.tracking.relocalise)
         self.chained: list[Float] = []
         self.spent = 0
-        self._submaps: dict[int, CellMap] = {}
+        self._submaps: dict[int, CellMap] = {}  # those used last, the latest at the end
         self._fields: dict[int, NDArray[np.uint8]] = {}  # of those that were searched
+        self._drawn: set[int] = set()  # middles of all submaps so far
 
     def step(self, j: int) -> Edge:
         """The step to key frame ``j``, matched to the few before it; as online where it is poor."""
@@ -159,11 +161,25 @@ class Closures:
         return Edge(a=middle, b=j, T_a_b=T_a_b, information=inverted(covariance), robust=True)
 
     def _submap(self, middle: int) -> CellMap:
-        """What the key frames about ``middle`` saw, in the frame of that one."""
-        if middle not in self._submaps:
+        """What the key frames about ``middle`` saw, in the frame of that one.
+
+        It is drawn again, to the same cells, where ``KEPT`` others were used since. That is not
+        ``spent``: what work comes when must not depend on what is kept.
+        """
+        cell_map = self._submaps.pop(middle, None)
+        if cell_map is None:
             about = range(middle - self._numbers.submap, middle + self._numbers.submap + 1)
-            self._submaps[middle] = self._map_of(about, middle)
-        return self._submaps[middle]
+            before = self.spent
+            cell_map = self._map_of(about, middle)
+            if middle in self._drawn:
+                self.spent = before
+            self._drawn.add(middle)
+        self._submaps[middle] = cell_map
+        if len(self._submaps) > KEPT:
+            oldest = next(iter(self._submaps))
+            del self._submaps[oldest]
+            self._fields.pop(oldest, None)
+        return cell_map
 
     def _map_of(self, members: Iterable[int], origin: int) -> CellMap:
         """What some key frames saw, in the frame of one, as the chain puts them."""

@@ -89,7 +89,31 @@ def observable(
 
 
 @njit
-def advance(  # noqa: PLR0913 (kernel)
+def root_share(
+    part: tuple[float, float, float],
+    whole: NDArray[np.float64],
+    times: float,
+    out: NDArray[np.float64],
+) -> None:
+    """``out`` (2, 2): root of ``times`` the share, at most 1, that ``part`` has of ``whole``.
+
+    Both are symmetric, ``part`` by xx, xy, yy; the share is taken along the axes of ``whole``.
+    """
+    a, b, d = whole[0, 0], whole[0, 1], whole[1, 1]
+    angle = 0.5 * math.atan2(2.0 * b, a - d)
+    c, s = math.cos(angle), math.sin(angle)
+    xx, xy, yy = part
+    most = c * c * xx + 2.0 * c * s * xy + s * s * yy, c * c * a + 2.0 * c * s * b + s * s * d
+    least = s * s * xx - 2.0 * c * s * xy + c * c * yy, s * s * a - 2.0 * c * s * b + c * c * d
+    one = math.sqrt(min(max(times * most[0] / max(most[1], 1e-12), 0.0), 1.0))
+    other = math.sqrt(min(max(times * least[0] / max(least[1], 1e-12), 0.0), 1.0))
+    out[0, 0] = c * c * one + s * s * other
+    out[0, 1] = out[1, 0] = c * s * (one - other)
+    out[1, 1] = s * s * one + c * c * other
+
+
+@njit
+def advance(  # noqa: C901, PLR0913 (kernel)
     drift: NDArray[np.float64],
     blind: NDArray[np.float64],
     shared: NDArray[np.float64],
@@ -98,15 +122,16 @@ def advance(  # noqa: PLR0913 (kernel)
     prior: NDArray[np.float64],
     data: NDArray[np.float64],
     variances: tuple[float, float, float, float],
-    written: float,
+    written: NDArray[np.float64],
 ) -> None:
     """One frame; all arrays (3, 3) in the map frame, changed in place but the last three.
 
     ``data``: information of the match, with the weight it was given. ``variances``: per unit of
     information, of the shared error and of what is newly written; frames in which the first stays;
-    by how much less (standard deviation) surfaces agree in their error of the heading. ``written``:
-    share of the map in view that was written lately, off by what odometry was off then: of what the
-    data take off odometry's error, so much is the map's from now on.
+    by how much less (standard deviation) surfaces agree in their error of the heading. ``written``
+    (3, 3): root of the share of the map in view that was written lately, by directions; it is off
+    by what odometry was off then. Of what the data take off odometry's error, so much is the map's
+    from now on.
     """
     F, N = np.zeros((3, 3)), np.empty((3, 3))
     F[0, 0] = F[1, 1] = F[2, 2] = 1.0
@@ -131,6 +156,10 @@ def advance(  # noqa: PLR0913 (kernel)
         for j in range(3):
             N[i, j] = (1.0 if i == j else 0.0) - N[i, j]
     _sandwich(N, moved, kept)
+    _sandwich(written, kept, moved)
+    for i in range(3):
+        for j in range(3):
+            kept[i, j] = moved[i, j]
     _inverse(prior, precision)
     # the shared error, as far as the data decide over the time that it stays the same
     _inverse(_sum(data, 1.0 / variances[2], precision), M)
@@ -139,7 +168,7 @@ def advance(  # noqa: PLR0913 (kernel)
         for j in range(3):
             turns = (variances[3] if i == 2 else 1.0) * (variances[3] if j == 2 else 1.0)
             shared[i, j] = turns * variances[0] * moved[i, j]
-            newest[i, j] = turns * variances[1] * moved[i, j] + written * kept[i, j]
+            newest[i, j] = turns * variances[1] * moved[i, j] + kept[i, j]
             drift[i, j] += newest[i, j]
 
 
@@ -169,13 +198,14 @@ def innovation(
     data: NDArray[np.float64],
     off: NDArray[np.float64],
     share: float,
+    across: tuple[float, float],
 ) -> tuple[float, float, float, float, float]:
     """What the correction ``off`` of a pose matched with ``prior`` says about what is ``stated``.
 
     ``data`` is the information with which the match corrected, ``share`` how much of the variance
     that claims it really has. The innovation e is what a match alone would have said: off = K e, so
     e = off + R inv(P) off. Returns its NIS, its squares in position and heading, and the match's
-    variances there.
+    variances there; of the position only along the unit vector ``across`` unless that is zero.
     """
     precision, R, S = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
     _inverse(prior, precision)
@@ -193,5 +223,9 @@ def innovation(
     for i in range(3):
         for k in range(3):
             nis += e[i] * S[i, k] * e[k]
-    place = e[0] * e[0] + e[1] * e[1]
-    return nis, place, e[2] * e[2], share * (R[0, 0] + R[1, 1]), share * R[2, 2]
+    x, y = across
+    place, variance = e[0] * e[0] + e[1] * e[1], R[0, 0] + R[1, 1]
+    if x != 0.0 or y != 0.0:
+        place = (x * e[0] + y * e[1]) ** 2
+        variance = x * x * R[0, 0] + 2.0 * x * y * R[0, 1] + y * y * R[1, 1]
+    return nis, place, e[2] * e[2], share * variance, share * R[2, 2]

@@ -15,7 +15,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float, Odometry
-from slam.frontend.odometry_prior import HeadingBias, Prediction, predict
+from slam.frontend.odometry_prior import HeadingBias, Prediction, predict, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import innovation
@@ -24,6 +24,14 @@ from slam.tracker.uncertainty.covariances import innovation
 def _noise_share(config: TrackerConfig, sensor_sigma_m: float) -> float:
     """Variance of a match by the noise of its beams over what the overlaps' curvature claims."""
     return (sensor_sigma_m / (config.frontend.sigma_cells * config.cell_m)) ** 2 / 2.0
+
+
+def _across(covariance: Float, across: tuple[float, float]) -> float:
+    """Variance of the position along a unit vector; of both directions where that is zero."""
+    (a, b, _), (_, d, _), _ = covariance.tolist()
+    x, y = across
+    variance: float = a + d if x == y == 0.0 else x * x * a + 2.0 * x * y * b + y * y * d
+    return variance
 
 
 class OdometryNoise:
@@ -90,8 +98,17 @@ class OdometryNoise:
         self._stated = stated
         return predict(T_map_before, before, now, scales, self.bias)
 
-    def learn(self, prediction: Prediction, match: Match, sensor_sigma_m: float) -> None:
-        """Compare the increment with a match that is used, by ranges of that sigma."""
+    def learn(
+        self,
+        prediction: Prediction,
+        match: Match,
+        sensor_sigma_m: float,
+        along_rad: float | None = None,
+    ) -> None:
+        """Compare the increment with a match that is used, by ranges of that sigma.
+
+        ``along_rad``: direction in the map about which the match says nothing; None: there is none.
+        """
         off = match.T_map_robot - prediction.T_map_robot
         off[2] = se2.wrap(float(off[2]))
         data = match.tau * match.information
@@ -102,17 +119,21 @@ class OdometryNoise:
             found_out = match.matched, float(off[2]), data
             self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)
         share = min(match.tau * self.noise_share(sensor_sigma_m), 1.0)
+        across = (0.0, 0.0) if along_rad is None else (-math.sin(along_rad), math.cos(along_rad))
         self.nis, *found = innovation(
-            prediction.covariance + prediction.carried, prediction.prior, data, off, share
+            prediction.covariance + prediction.carried, prediction.prior, data, off, share, across
         )
-        (a, _, _), (_, b, _), (_, _, c) = prediction.unscaled.tolist()
-        (x, _, _), (_, y, _), (_, _, t) = prediction.carried.tolist()
+        start = float(prediction.T_map_robot[2]) - float(prediction.increment[2])
+        of_step = turned(prediction.unscaled, start)
+        c, t = float(of_step[2, 2]), float(prediction.carried[2, 2])
+        of_place, of_carried = _across(of_step, across), _across(prediction.carried, across)
         floor_m2, floor_rad2 = prediction.floor
+        floors_m2 = floor_m2 * (2.0 if along_rad is None else 1.0)
         config = self._config
         frames = max(config.memory, config.memory_s / max(prediction.elapsed, 1e-3))
         keep = math.exp(-1.0 / frames)
         for k, unit, rest in (
-            (0, a + b, 2.0 * floor_m2 + x + y + found[2]),
+            (0, of_place, floors_m2 + of_carried + found[2]),
             (1, c, floor_rad2 + t + found[3]),
         ):
             expected = float(self.scales[k]) * unit + rest

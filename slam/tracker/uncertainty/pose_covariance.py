@@ -24,7 +24,7 @@ from slam.frames import Float
 from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
-from slam.tracker.uncertainty.covariances import advance, carried, observable
+from slam.tracker.uncertainty.covariances import advance, carried, observable, root_share
 from slam.tracker.uncertainty.residuals import Evidence
 
 
@@ -36,6 +36,7 @@ class PoseCovariance:
     by_movers_m   deviation of the position by what movers may have carried map and robot off
     unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
                   the noise of their beams would
+    unseen_s      s since all directions were observable; it fades once they are
     along_rad     direction in the map of the one that is not observable, None unless it is one
     """
 
@@ -51,6 +52,8 @@ class PoseCovariance:
         self._lattice = (numbers.lattice_cells * config.cell_m) ** 2
         self._products, self._pairs = numbers.at_first * numbers.usual_m**2, numbers.at_first
         self._geometry: Float = np.zeros((3, 3))
+        self._new_geometry = [0.0, 0.0, 0.0]
+        self.unseen_s = 0.0
         self._feigned, self._weighed = 0.0, 0.0
         self._in_view, self._looks = 0.0, 0.0
         self._drift: Float = np.zeros((3, 3))
@@ -104,11 +107,14 @@ class PoseCovariance:
         Without ``evidence`` the match was not used: odometry alone moved the robot.
         """
         config, data = self._config, np.zeros((3, 3))
-        strength, new = 0.0, 0.0
+        strength, new, written = 0.0, 0.0, np.zeros((3, 3))
         if evidence is not None:
             self._learn(evidence, prediction.elapsed)
             strength = match.tau * float(match.information[0, 0] + match.information[1, 1])
             new = evidence.new / max(evidence.weighed, 1e-9)
+            xx, xy, yy = self._new_geometry
+            root_share((xx, xy, yy), self._geometry, config.written, written)
+            written[2, 2] = math.sqrt(min(config.written * new, 1.0))
         if strength > 0.0 and self._weighed > config.forgotten:
             feigned = self._feigned / self._weighed
             geometry = self._geometry * (1.0 / self._weighed)
@@ -118,6 +124,10 @@ class PoseCovariance:
         else:
             self.unobservable, self.along_rad = 2, None
             self._blind = self._blind + self._shared
+        faded = math.exp(-prediction.elapsed / config.view_s)
+        self.unseen_s = (
+            self.unseen_s + prediction.elapsed if self.unobservable else self.unseen_s * faded
+        )
         variance = (self._lattice + config.shared_times**2 * self.shared_m2) * self._fewer()
         frames = max(1.0, config.correlated_s / max(prediction.elapsed, 1e-3))
         advance(
@@ -134,7 +144,7 @@ class PoseCovariance:
                 frames,
                 config.turn_times,
             ),
-            min(config.written * new, 1.0),
+            written,
         )
         self.covariance = self._drift + self._blind + self._shared
 
@@ -155,6 +165,9 @@ class PoseCovariance:
         """The map frame was turned by ``by`` rad, and the robot with it."""
         self._drift, self._blind = turned(self._drift, by), turned(self._blind, by)
         self._shared, self._geometry = turned(self._shared, by), turned(self._geometry, by)
+        xx, xy, yy = self._new_geometry
+        part = turned(np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, 0.0]]), by)
+        self._new_geometry = [float(part[0, 0]), float(part[0, 1]), float(part[1, 1])]
         self._by_movers = turned(self._by_movers, by)
         self.covariance = self._drift + self._blind + self._shared
 
@@ -170,6 +183,8 @@ class PoseCovariance:
         self._pairs = keep * self._pairs + evidence.paired
         keep = math.exp(-elapsed / self._config.view_s)
         self._geometry = keep * self._geometry + evidence.geometry
+        more = evidence.new_geometry.tolist()
+        self._new_geometry = [keep * a + b for a, b in zip(self._new_geometry, more, strict=True)]
         self._feigned = keep * self._feigned + evidence.feigned
         self._weighed = keep * self._weighed + evidence.weighed
         self._in_view = keep * self._in_view + evidence.in_view

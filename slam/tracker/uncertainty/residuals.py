@@ -25,7 +25,8 @@ from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MASK, SHIFT, Cells
 
-SHARED, PAIRED, FEIGNED, NEW, WEIGHED = range(5)  # places in the sums of ``_look``
+# places in the sums of ``_look``
+SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
 
 
 class Pairing(NamedTuple):
@@ -146,14 +147,15 @@ def _free_standing(
 
 
 @njit
-def _look(  # noqa: PLR0913 (kernel)
+def _look(  # noqa: PLR0913, PLR0915 (kernel)
     cells: Cells, short_term: float, cell: float,
     points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
     joined: NDArray[np.bool_], laser: NDArray[np.float64], pose: NDArray[np.float64],
-    start: int, step: int, times: tuple[float, float], pairing: Pairing,
+    start: int, step: int, times: tuple[float, float, float], pairing: Pairing,
     geometry: NDArray[np.float64], sums: NDArray[np.float64],
 ) -> None:  # fmt: skip
-    """Add up what ``Evidence`` holds; ``times``: s of one look, and of a trace's prior age."""
+    """Add up what ``Evidence`` holds; ``times``: s of one look, of a trace's prior age, and
+    since all directions of position were seen."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     off = np.empty(2)
     surfaces = False
@@ -170,7 +172,9 @@ def _look(  # noqa: PLR0913 (kernel)
             continue
         w = weights[first]
         sums[WEIGHED] += w
-        sums[NEW] += w * times[0] / (_age(cells, u, v) + times[0] + times[1])
+        age = _age(cells, u, v) + times[0] + times[1]
+        sums[NEW] += w * times[0] / age
+        new = (times[0] + times[2]) / (age + times[2])
         rx, ry = (u + 0.5) * cell - pose[0], (v + 0.5) * cell - pose[1]
         a, b, d = 1.0, 0.0, 1.0
         if k >= 0:
@@ -189,6 +193,9 @@ def _look(  # noqa: PLR0913 (kernel)
         geometry[0, 0] += a
         geometry[0, 1] += b
         geometry[1, 1] += d
+        sums[NEW_XX] += new * a
+        sums[NEW_XY] += new * b
+        sums[NEW_YY] += new * d
         geometry[0, 2] += b * rx - a * ry
         geometry[1, 2] += d * rx - b * ry
         geometry[2, 2] += a * ry * ry - 2.0 * b * rx * ry + d * rx * rx
@@ -209,6 +216,8 @@ class Evidence:
     paired    weight of those pairs
     feigned   what the noise of beams adds to the geometry along surfaces
     new       weighted sum of the share that this look has in the trace it writes
+    new_geometry  (3,) xx, xy, yy: the geometry of positions, each point times the share that looks
+              have in its trace since all directions were last seen
     """
 
     geometry: Float
@@ -218,6 +227,7 @@ class Evidence:
     paired: float
     feigned: float
     new: float
+    new_geometry: Float
 
 
 def look(
@@ -225,12 +235,13 @@ def look(
     short_term: float,
     seen: Observations,
     T_map_robot: Float,
-    elapsed: float,
+    times: tuple[float, float],
     turn: int,
 ) -> Evidence:
     """Compare a sample of what is ``seen`` from ``T_map_robot`` with the map, before it is written.
 
-    ``elapsed`` s since the last frame; ``turn`` counts frames: others are looked at each time.
+    ``times``: s since the last frame, and since all directions of position were seen; ``turn``
+    counts frames: others are looked at each time.
     """
     config, cell = cell_map.config.uncertainty.residuals, cell_map.cell
     step = max(1, len(seen.points_robot) // config.samples)
@@ -241,15 +252,17 @@ def look(
         bent=config.bent,
         sensor_sigma=seen.sensor_sigma_m,
     )
-    geometry, sums = np.zeros((3, 3)), np.zeros(5)
+    geometry, sums = np.zeros((3, 3)), np.zeros(8)
+    elapsed, since_s = times
     # what moves says nothing of how far the map is off, nor is it new map
     weights = seen.weights if seen.votes is None else seen.weights * seen.votes
     _look(
         cell_map.cells, short_term, cell_map.cell,
         seen.points_robot, seen.covariances, weights, seen.joined, seen.T_robot_laser,
-        T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed)), pairing, geometry, sums,
+        T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed), since_s), pairing,
+        geometry, sums,
     )  # fmt: skip
-    shared, paired, feigned, new, weighed = sums.tolist()
+    shared, paired, feigned, new, weighed = sums[:NEW_XX].tolist()
     return Evidence(
         geometry=geometry,
         weighed=weighed,
@@ -258,4 +271,5 @@ def look(
         paired=paired,
         feigned=feigned,
         new=new,
+        new_geometry=sums[NEW_XX:],
     )

@@ -112,7 +112,7 @@ def test_it_is_published_alone_and_in_place_of_an_older_one(tmp_path):
     assert (copied["commit"], copied["command"]) == ("abc", command)
 
 
-def test_a_benchmark_with_days_has_the_section_and_the_same_board(tmp_path, monkeypatch):
+def test_a_second_call_makes_nothing_again_and_adds_the_section_of_days(tmp_path, monkeypatch):
     monkeypatch.setattr(days, "QUICK_SESSIONS", 2)
     words = (
         f"benchmark --slam odometry --tracks busy-chairs --quick --seeds 1 --seconds 1.2 "
@@ -123,9 +123,13 @@ def test_a_benchmark_with_days_has_the_section_and_the_same_board(tmp_path, monk
     before = (tmp_path / "out/leaderboard.md").read_text()
     table = (tmp_path / "out/leaderboard.csv").read_bytes()
     assert not (tmp_path / "out/days.csv").exists()
+    jobs = (file for kind in ("recordings", "entries") for file in tmp_path.rglob(f"{kind}/*.npz"))
+    made = {file: file.stat().st_mtime_ns for file in jobs}
+    assert len(made) == 12  # three recordings; the control and two oracles on each
     done = CliRunner().invoke(app, [*words, "--days"])
     assert done.exit_code == 0, (done.output, done.exception)
     assert "`odometry`: starts anew: cannot load a map" in " ".join(done.output.split())
+    assert {file: file.stat().st_mtime_ns for file in made} == made
     text = (tmp_path / "out/leaderboard.md").read_text()
     assert text == f"{before}\n{days.section(days.read(tmp_path / 'out/days.json'))}\n"
     assert (tmp_path / "out/leaderboard.csv").read_bytes() == table

@@ -113,11 +113,14 @@ def test_a_published_track_says_itself_whether_it_counts_and_any_other_its_oracl
     assert scores.fairness(OPEN, good)["counts"]
     assert not scores.fairness(OPEN, lost)["counts"]
     assert not scores.fairness(OPEN, [])["counts"]
-    far = [r | {"error_tracking_m": 0.021} if r["dynamism"] == 0.75 else r for r in good]
+    far = [r | {"error_tracking_m": 0.051} if r["dynamism"] == 0.75 else r for r in good]
     assert not scores.fairness(OPEN, far)["counts"]  # at one level is enough
-    assert scores.fairness(OPEN, far)["oracle_error_m"] == 0.021
+    assert scores.fairness(OPEN, far)["oracle_error_m"] == 0.051
     other = scores.fairness(OPEN, [*lost, *runs("oracle(map)", KEPT)])
     assert (other["counts"], other["oracle"]) == (True, "oracle(map)")  # either may hold
+    for lost, fair in ((2, True), (3, False)):
+        table = [[0, 0, 0, 0, k < lost] for k in range(20)]
+        assert scores.fairness(OPEN, runs(ORACLE, table))["counts"] is fair
 
 
 def board(mine: list[dict], track: Track = TRACK, oracle: list[list[int]] = KEPT) -> Board:

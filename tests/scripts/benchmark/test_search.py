@@ -20,7 +20,7 @@ def run(lost: int, ours: tuple[int, float], of_map: tuple[int, float]) -> dict[s
     return {"slams": {"mine": {"lost": lost}, **(oracles if lost else {})}}
 
 
-GOOD, OFF, GONE = (0, 0.01), (0, 0.05), (1, 0.01)
+GOOD, OFF, GONE = (0, 0.01), (0, 0.06), (1, 0.01)
 EASY, HARD = run(0, GOOD, GOOD), run(1, GOOD, GONE)
 
 

@@ -219,6 +219,8 @@ def test_only_what_is_alike_is_merged():
     track = newest()["tour-guide"]
     plain: dict[str, Any] = {"tracks": (track,), "slams": ("ekf",), "subject": "ekf", "seeds": 2}
     make._check_alike([made()], Wanted(**plain), set())
+    later = newest()["moving-boards"]  # whose seeds are others
+    make._check_alike([made()], Wanted(**plain | {"tracks": (track, later)}), set())
     for other in ({"seeds": 3}, {"quick": True}, {"seconds": 5.0}, {"train": True}):
         with pytest.raises(InvalidValueError, match="those of the board"):
             make._check_alike([made()], Wanted(**plain | other), set())

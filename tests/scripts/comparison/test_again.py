@@ -20,6 +20,7 @@ from scripts.debugger.recording import record
 from scripts.film.footage import open_run
 from slam.errors import InvalidValueError, LogFormatError
 
+READERS = (open_run, lambda path: case_of(path, None, 1))  # of films and of inquests
 PLAN = {"scenes": ("arena",), "levels": (0.5,), "seeds": (7,), "scanner": "noise"}
 
 
@@ -61,7 +62,7 @@ def test_the_verbs_take_it(run, tmp_path):
 
 
 def test_what_is_no_run_is_told_in_a_line(run, tmp_path):
-    for opened in (open_run, lambda path: case_of(path, None, 1)):
+    for opened in READERS:
         with pytest.raises(LogFormatError, match=r"many runs: name one of them, as .*_s7\.npz"):
             opened(run.parent.parent)
     with pytest.raises(InvalidValueError, match=r"--every: .* one scan in 8"):
@@ -79,3 +80,34 @@ def test_what_is_no_run_is_told_in_a_line(run, tmp_path):
     )
     with pytest.raises(LogFormatError, match="no recipe of a comparison: "):
         run_of(tmp_path / "runs" / "x.npz")
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        ("{", "recipe.json: no recipe"),
+        ('{"world": 2, "settings": {"sce', "recipe.json: no recipe"),
+        ("[]", "not a JSON object"),
+        ('{"recipe": {}}', "no recipe"),
+        ('{"command": "run"}', "no settings"),
+        ('{"command": "bench", "settings": {}}', "made by 'mobilia bench'"),
+        ('{"command": "compare", "settings": {}}', "a comparison of many runs: name one"),
+        ('{"command": "drive", "settings": {}}',
+         "made by 'mobilia drive', where each SLAM's robot went its own way"),
+        ('{"command": "run", "settings": {"log": "a.log"}}', "this run was on a log"),
+        ('{"world": 2, "settings": {"log": "a.log", "slams": ["ekf"]}}',
+         "render 'a.log' itself with --slam ekf"),
+        ('{"world": 2, "settings": {"scene": "arena", "seconds": "long"}}',
+         "no recipe of a run: seconds must be a number"),
+        ('{"world": 2, "settings": {"scene": "arena", "seconds": 5, "slams": 7}}',
+         "slams must be a list of names, got 7"),
+        ('{"world": 2, "settings": {"scene": "arena", "slams": [7]}}',
+         "slams must be a list of names, got [7]"),
+    ],
+)  # fmt: skip
+def test_a_recipe_that_cannot_be_one_is_told_in_a_line(tmp_path: Path, text: str, says: str):
+    (tmp_path / "recipe.json").write_text(text)
+    for opened in READERS:
+        with pytest.raises(LogFormatError, match=r"^[^\n]*$") as told:
+            opened(tmp_path)
+        assert says in str(told.value)

@@ -21,10 +21,9 @@ from scripts.comparison.entry import lost_at
 from scripts.comparison.plan import Plan
 from scripts.comparison.rules import Table, number, word
 from scripts.option_names import Verb, repeated
-from scripts.options import levels
 from scripts.verbs import compare as verb
 from slam import Estimate, Trajectory, se2, system
-from slam.errors import InvalidValueError, LogFormatError, OutputError, UnknownNameError
+from slam.errors import LogFormatError, OutputError
 from slam.evaluation import metrics
 from slam.evaluation.lost import LOST_M
 
@@ -234,19 +233,7 @@ def test_the_command_line_of_the_readme(monkeypatch):
     assert seen["ways"] == {"jobs": 2, "cluster": None}
 
 
-def test_what_cannot_be_compared_is_said_in_a_line(tmp_path):
-    with pytest.raises(UnknownNameError, match="Did you mean 'shunting'"):
-        make.carry_out(Plan(slams=("shuntin",), **PLAN), tmp_path / "a")
-    with pytest.raises(UnknownNameError, match="Did you mean 'arena'"):
-        make.carry_out(Plan(slams=("odometry",), **{**PLAN, "scenes": ("arenna",)}), tmp_path / "a")
-    with pytest.raises(InvalidValueError, match=r"Plan\.slams"):
-        Plan(slams=("odometry", "odometry"), **PLAN)
-    with pytest.raises(InvalidValueError, match="--dynamism"):
-        levels(["much"])
-    with pytest.raises(InvalidValueError, match=r"\[0, 1\]"):
-        Plan(slams=("odometry",), **{**PLAN, "levels": (2.0,)})
-    with pytest.raises(InvalidValueError, match="needs 2 scans a run"):
-        Plan(slams=("odometry",), **{**PLAN, "seconds": 0.1})
+def test_somebody_elses_folder_is_refused(tmp_path):
     (tmp_path / "mine").mkdir()
     (tmp_path / "mine" / "letter.txt").write_text("dear")
     with pytest.raises(OutputError, match="choose another"):

@@ -9,8 +9,7 @@ import numpy as np
 import pytest
 
 from scripts.comparison.maps import MapJudge, disc
-from scripts.comparison.places import OldPlace
-from scripts.comparison.sight import Sight, seen_empty
+from scripts.comparison.sight import OldPlace, Sight, seen_empty
 from tests.scripts.comparison.hand_made import HZ, WALL_M, raster, recording
 
 HERE, THERE = (2.0, 0.0), (1.5, 1.5)

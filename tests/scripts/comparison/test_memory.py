@@ -9,7 +9,7 @@ import mmap
 import numpy as np
 import pytest
 
-from scripts.comparison.memory import PeakMemory
+from scripts.comparison.entry import PeakMemory
 
 MB = 1_000_000
 

@@ -13,12 +13,12 @@ from typer.testing import CliRunner
 
 from scripts.cli import app
 from scripts.debugger.counterfactual import Inquest, Question, Trial, hold
-from scripts.debugger.episode import Case, case_of
+from scripts.debugger.episode import Case
 from scripts.debugger.picture import blame_picture
 from scripts.debugger.recording import Checkpoint, Tape, record
 from scripts.debugger.words import as_json, headline
 from sim.twins.absence import Change
-from slam.errors import LogFormatError, SlamFailedError, UnknownNameError
+from slam.errors import SlamFailedError, UnknownNameError
 from slam.evaluation.lost import Divergence
 
 SKITTISH = """
@@ -251,51 +251,3 @@ def test_the_verb_leaves_picture_table_and_numbers(tmp_path: Path):
     assert picture.shape[0] > 900
     assert picture.std() > 10.0
     assert json.loads((out / "recipe.json").read_text())["settings"]["every"] == 4
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ((), "name exactly one of RUN and --scene"),
-        (("nowhere",), "nowhere: no such folder"),
-        (("--scene", "arena", "--threshold", "0"), "--threshold must be > 0"),
-        (("--scene", "arena", "--every", "0"), "--every must be a whole number >= 1"),
-        (("--scene", "arena", "--horizon", "-1"), "--horizon must be > 0 s"),
-        (("--scene", "arena", "--top", "-1"), "--top must be a whole number >= 0"),
-        (("--scene", "arena", "--option", "walls"), "--option must be NAME=VALUE"),
-        (("--scene", "arena", "--option", "seed=4"), "--option seed: that has an option"),
-        (("--scene", "arena", "--option", "wall=no"), "cannot take these options"),
-        (("--scene", "arena", "--seconds", "1", "--at", "7"), "--at must lie in"),
-    ],
-)
-def test_wrong_words_are_told_by_name(tmp_path: Path, words, says):
-    done = mobilia("blame", *words, "--out", tmp_path / "out")
-    assert done.exit_code == 1
-    assert says in str(done.exception)
-    assert list(tmp_path.iterdir()) == []
-
-
-@pytest.mark.parametrize(
-    ("text", "says"),
-    [
-        ("{", "no recipe"),
-        ("[]", "not a JSON object"),
-        ('{"command": "run"}', "no settings"),
-        ('{"command": "compare", "settings": {}}', "a comparison of many runs: name one"),
-        ('{"command": "run", "settings": {"log": "a.log"}}', "this run was on a log"),
-        (
-            '{"command": "run", "world": 2, "settings": {"scene": "arena", "seconds": "long"}}',
-            "seconds must be a number",
-        ),
-        (
-            '{"command": "run", "world": 2, "settings": {"scene": "arena", "seconds": 5, '
-            '"slams": 7}}',
-            "slams must be a list of names, got 7",
-        ),
-        ('{"recipe": {}}', "no recipe"),
-    ],
-)
-def test_a_recipe_that_cannot_be_one_is_named(tmp_path: Path, text, says):
-    (tmp_path / "recipe.json").write_text(text)
-    with pytest.raises(LogFormatError, match=says):
-        case_of(tmp_path, None, 1)

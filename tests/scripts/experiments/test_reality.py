@@ -36,7 +36,7 @@ def test_the_table_sets_ranks_beside_ranks(files: tuple[Path, Path]) -> None:
     predicted = {name: {"0": value} for name, value in TWIN.items()}
     files[0].write_text(json.dumps({log: {"errors_m": predicted} for log in ("intel", "fhw")}))
     files[1].write_text(json.dumps({"intel": LOG, "fhw": TWIN}))
-    lines = reality.table()
+    lines = reality.tables()
     assert lines[2].startswith("| intel | 0.01 / 0.1 |")
     assert lines[2].endswith("| +0.80 |")
     assert lines[3].endswith("| +1.00 |")

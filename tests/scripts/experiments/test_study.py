@@ -12,8 +12,8 @@ import pytest
 
 from scripts.benchmark.tracks import TRACKS
 from scripts.comparison.recording import Recording
+from scripts.console import ended
 from scripts.experiments import ablation, shared, study, uncertainty
-from scripts.experiments.measured import ended
 from scripts.experiments.shared import of, on_stream, share, world_1
 from scripts.experiments.study import Study
 from sim.core.dynamism import Dynamism
@@ -38,7 +38,7 @@ def test_what_is_declared_can_be_run(name: str):
     cases = one.cases(one._parser().parse_args([]))
     assert cases
     if drive := one.drive(cases[-1]):
-        assert study._recorded(drive).file_name()
+        assert study.recorded(drive).file_name()
     for slam in {case["slam"] for case in cases if "slam" in case}:
         create(slam)
 
@@ -123,12 +123,13 @@ def test_what_cannot_be_run_is_told_in_a_line(tmp_path: Path, capsys, words, say
 
 
 def test_an_error_of_ours_ends_an_experiment_in_a_line(capsys: pytest.CaptureFixture):
+    @ended
     def wrong() -> int:
         raise InvalidValueError("motion must be one of 1, 0.75, 0.5, got 0.3")
 
-    assert ended(wrong) == 1
+    assert wrong() == 1
     assert capsys.readouterr().err == "motion must be one of 1, 0.75, 0.5, got 0.3\n"
-    assert ended(lambda: None) == 0
+    assert ended(lambda: None)() == 0
 
 
 def test_a_run_that_fails_counts_as_lost(monkeypatch: pytest.MonkeyPatch):

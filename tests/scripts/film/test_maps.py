@@ -7,16 +7,16 @@ import numpy as np
 import pytest
 
 from scripts.film.encode import LAPSE_FPS, MOST_PICTURES, Pace
-from scripts.single_run.small_maps import drawn, for_file
+from scripts.single_run.score import drawn, for_file
 from sim.view import moment
 from slam import create
+from slam.frames import LaserSpec, Scan
 from slam.frontend.seen_space import SeenSpace
 from slam.replay import Track
-from slam.strips import of_raster
-from slam.system import MapsInParts, Raster
-from tests.world2d import World2D, frames, laser, office, office_loop
+from slam.system import Raster
 
 CELL = 0.05
+SPEC = LaserSpec(n_beams=9, angle_min=-1.0, angle_increment=0.25)
 
 
 def made(height, width, at=(-3, 5), seed=0):
@@ -25,26 +25,6 @@ def made(height, width, at=(-3, 5), seed=0):
     values = np.where(rng.random((height, width)) < 0.1, rng.random((height, width)), np.nan)
     origin = np.array([at[0] * CELL, at[1] * CELL, 0.0])
     return Raster(values=values.astype(np.float32), resolution_m=CELL, T_map_origin=origin)
-
-
-def test_the_parts_of_a_slam_are_those_of_its_map():
-    stream = frames(World2D(office()), office_loop(), rate_hz=5.0, spec=laser(181))[:40]
-    for name in ("shunting", "occupancy"):
-        track = Track(name, create(name))
-        empty = track.map_part((0.0, 0.0, 1.0, 1.0))
-        assert empty is None or np.isnan(empty.values).all()
-        assert track.survive(stream) is None
-        assert isinstance(track.system, MapsInParts)
-        whole, part = track.map(), track.map_part((1.0, -0.5, 4.0, 2.0))
-        j, i = np.round((part.T_map_origin - whole.T_map_origin)[:2] / whole.resolution_m).astype(
-            int
-        )
-        height, width = part.values.shape
-        np.testing.assert_array_equal(part.values, whole.values[i : i + height, j : j + width])
-        assert height * width < whole.values.size
-        assert track.map_part((500.0, 0.0, 501.0, 1.0)) is None
-    odometry = Track("odometry", create("odometry"))
-    assert odometry.map_part((0.0, 0.0, 1.0, 1.0)) is None
 
 
 class Kept:
@@ -74,12 +54,15 @@ def test_a_map_in_pictures_keeps_thin_walls_and_its_extent():
 
 
 def test_a_map_too_large_for_an_image_has_coarser_cells_and_says_so(monkeypatch):
-    strips = of_raster(made(1000, 500))
-    assert for_file(strips, SeenSpace()) == (strips, "")
-    monkeypatch.setattr("scripts.single_run.small_maps.MOST_PIXELS", 125_000)
-    fitting, said = for_file(strips, SeenSpace())
-    assert fitting.shape == (500, 250)
-    assert "cells of 0.1 m instead of 0.05 m: the map is 25 m x 50 m" in said
+    raster, seen = made(1000, 500), SeenSpace(CELL)
+    seen.add(Scan(stamp_ns=0, ranges=np.full(9, 2.0, np.float32), spec=SPEC), np.array([9, 9, 0]))
+    assert for_file(raster, seen)[1] == ""
+    assert for_file(raster, seen)[0].resolution_m == CELL
+    monkeypatch.setattr("scripts.single_run.score.MOST_PIXELS", 125_000)
+    fitting, said = for_file(raster, seen)
+    assert fitting.values.size <= 125_000
+    assert np.nanmax(fitting.values) == np.nanmax(raster.values)
+    assert "m instead of 0.05 m: the map is 25 m x 50 m" in said
 
 
 def test_the_film_of_a_long_log_has_a_bounded_number_of_pictures():

@@ -41,9 +41,6 @@ def without_gl(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(gl, "find", lambda: Gl(backend=None, reason="no GL here"))
 
 
-OF_WORLD = f'{{"world": {WORLD}, "settings": %s}}'
-
-
 @pytest.fixture
 def run(tmp_path: Path) -> Path:
     folder = tmp_path / "run"
@@ -231,34 +228,6 @@ def test_a_wrong_option_is_named_and_nothing_is_written(run: Path, tmp_path: Pat
 def test_a_film_is_an_mp4(run: Path, tmp_path: Path):
     with pytest.raises(MobiliaError, match=r"--out must be a file that ends in \.mp4"):
         render(run, "--out", tmp_path / "film.xyz")
-
-
-def test_what_is_no_run_is_told_in_one_line(run: Path, tmp_path: Path):
-    def told(path: Path) -> str:
-        with pytest.raises(LogFormatError, match=r"^[^\n]*$") as caught:
-            open_run(path)
-        return str(caught.value)
-
-    assert "no such file" in told(tmp_path / "absent")
-    whole = (run / "recipe.json").read_text()
-    (run / "recipe.json").write_text(whole[: len(whole) // 2])
-    assert "recipe.json: no recipe" in told(run)
-    (run / "recipe.json").write_text("[]")
-    assert "not a JSON object" in told(run)
-    (run / "recipe.json").write_text(
-        '{"world": 2, "settings": {"scene": "arena", "seconds": "long"}}'
-    )
-    assert "no recipe of a run: seconds must be" in told(run)
-    (run / "recipe.json").write_text(OF_WORLD % '{"scene": "arena", "slams": [7]}')
-    assert "slams must be a list of names, got [7]" in told(run)
-    (run / "recipe.json").write_text('{"command": "bench", "settings": {}}')
-    assert "made by 'mobilia bench'" in told(run)
-    (run / "recipe.json").write_text('{"command": "drive", "settings": {}}')
-    assert "made by 'mobilia drive', where each SLAM's robot went its own way" in told(run)
-    (run / "recipe.json").write_text(
-        '{"world": 2, "settings": {"log": "intel.log", "slams": ["ekf"]}}'
-    )
-    assert "render 'intel.log' itself with --slam ekf" in told(run)
 
 
 def test_a_log_torn_in_the_middle_is_named(tmp_path: Path):

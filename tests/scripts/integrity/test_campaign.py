@@ -14,7 +14,7 @@ import numpy as np
 import pytest
 
 from scripts.integrity import campaign, losses, ways
-from scripts.integrity.tables import summary
+from scripts.integrity.campaign import summary
 from scripts.integrity.ways import EACH, WAYS, Case, cases
 from slam.errors import InvalidValueError
 from slam.odometry import OdometrySlam

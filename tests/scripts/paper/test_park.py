@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from scripts.paper import park_landmarks, park_scores
+from scripts.paper import park_scores
 from scripts.paper.census import NAMELESS
 from scripts.paper.runs import Run
 from slam import se2
@@ -69,7 +69,7 @@ def bent_drive(named: bool) -> tuple[Run, np.ndarray, Trajectory, Trajectory]:
 def test_a_map_that_has_drifted_has_lost_nothing(named):
     run, trunks, track, graph = bent_drive(named)
     assert np.hypot(*(track.poses[-1] - graph.poses[-1])[:2]) > 5.0
-    numbers = park_landmarks.census_of(run, trunks, track, graph).numbers()
+    numbers = park_scores.census_of(run, trunks, track, graph).numbers()
     assert len(trunks) > 60
     counts = [numbers[key] for key in ("misses", "spurious", "gone", "deleted by mistake")]
     assert counts == [0, 0, 0, 0]
@@ -81,7 +81,7 @@ def test_what_a_drifted_map_has_lost_is_counted():
     run.arrays["names"][last + np.array([7, 30])] = [1000, 1001]  # deleted and not found again
     found[last + np.array([7, 30])] += [0.0, 200.0]
     found[last + 50] += [0.0, 100.0]  # still there by name, at a wrong place
-    numbers = park_landmarks.census_of(run, trunks, track, graph).numbers()
+    numbers = park_scores.census_of(run, trunks, track, graph).numbers()
     counts = [numbers[key] for key in ("misses", "spurious", "gone", "deleted by mistake")]
     assert counts == [3, 3, 3, 2]
 

@@ -84,7 +84,7 @@ def run_of() -> dict[str, Any]:
         "kinds": np.array(["chair_visitor", "door"]), "radii_m": np.array([0.3, 0.9]),
         "closed": np.zeros((2, 3)), "static_map": room, "static_map_resolution_m": 0.1,
         "T_world_origin": np.zeros(3), "laser_angle_min": -math.pi / 2,
-        "laser_angle_increment": math.pi / (BEAMS - 1), "laser_range_max": 80.0,
+        "laser_angle_increment": math.pi / (BEAMS - 1), "laser_range_max": 80,
         "laser_T_robot_laser": np.zeros(3),
     }  # fmt: skip
     for k, answered in enumerate((SCANS, SCANS, 9)):

@@ -19,7 +19,7 @@ from scripts.closed_loop.folder import driven
 from scripts.comparison import folder as files
 from scripts.metrics.row import digits
 from scripts.metrics.table import METRICS
-from scripts.report import closed, page, pictures, tables, words
+from scripts.report import page, pictures, tables, words
 from scripts.report.study import study, verdict
 from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made
@@ -183,11 +183,11 @@ def test_the_moving_share_counts_beams_on_what_moves(folder: Path):
 def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path):
     drive = driven(made.make_drive(tmp_path / "drive"))
     assert drive.levels == [0.0, 1.0]
-    shown = [[(cell.text, cell.small) for cell in row] for row in closed.table(drive).rows]
+    shown = [[(cell.text, cell.small) for cell in row] for row in tables.of_drive(drive).rows]
     assert shown[1][:4] == [("shunting", ""), ("1", ""), ("6 of 8", "60 to 95 %"), ("1", "")]
     assert shown[1][6] == ("12.0", "10.0 to 20.0")
     assert shown[3][6] == ("–", "")  # another SLAM, which believed itself nowhere
-    few = closed.table(driven(made.make_drive(tmp_path / "few", reached=4))).rows[1]
+    few = tables.of_drive(driven(made.make_drive(tmp_path / "few", reached=4))).rows[1]
     assert (few[2].small, few[6].small) == ("40 to 95 %", "")  # five distances are no interval
     text = page.render(study(folder), [drive])
     assert text.count("<svg") == page.render(study(folder)).count("<svg") + 2
@@ -379,8 +379,3 @@ def test_another_folder_is_told_which_verb_is_missing(tmp_path: Path, kind: str,
     with pytest.raises(LogFormatError, match=re.escape(says)) as told:
         CliRunner().invoke(cli.app, ["report", str(folder)], catch_exceptions=False)
     assert str(folder) in str(told.value)
-
-
-def test_what_is_not_there_is_told_the_verb_too(tmp_path: Path):
-    with pytest.raises(LogFormatError, match="no such folder: mobilia compare"):
-        CliRunner().invoke(cli.app, ["report", str(tmp_path / "no")], catch_exceptions=False)

@@ -18,7 +18,6 @@ from scripts.verbs.config import config
 from sim.actors.config import ACTORS
 from sim.sensors.lidar import registry
 from slam import config_of
-from slam.errors import UnknownNameError
 from slam.set_numbers import with_set
 
 
@@ -83,25 +82,6 @@ def test_the_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 110
     assert any("key_m" in line and "between key frames" in line for line in lines)
-
-
-@pytest.mark.parametrize(
-    ("what", "group", "match"),
-    [
-        (
-            "kiss-icp",
-            "",
-            r"'kiss-icp' has no numbers to set. These have: ekf, .*lms221, rplidar_a1",
-        ),
-        ("shuntin", "", r"no numbers to set. Did you mean 'shunting'"),
-        ("actor{a=1}", "", r"no numbers to set. Did you mean 'actors'"),
-        ("shunting", "matchin.local", r"Did you mean 'matching.local'"),
-        ("shunting{rewrad=7}", "", r"Did you mean 'reward'"),
-    ],
-)
-def test_what_there_is_not_is_refused_with_a_hint(what: str, group: str, match: str) -> None:
-    with pytest.raises(UnknownNameError, match=match):
-        config(what, group)
 
 
 def test_the_numbers_of_a_slam_need_no_simulator() -> None:

@@ -14,7 +14,7 @@ from scripts.closed_loop.plan import Plan
 from scripts.closed_loop.runs import Driven, load, run_one
 from scripts.verbs.drive import _goals, _seeds
 from sim.loop import LoopConfig
-from slam.errors import InvalidValueError, OutputError, UnknownNameError
+from slam.errors import OutputError
 
 SHORT = {"goals": 1, "loop": LoopConfig(limit_s=1.0)}
 FILES = ("goals.csv", "runs.csv", "levels.csv", "runs.json", "closed_loop.png", "paths.png")
@@ -57,38 +57,16 @@ def test_a_run_depends_on_what_drives_it_and_not_on_tables():
     assert not {"plan.py", "tables.py", "pictures.py", "film.py"} & names
 
 
-def test_somebody_elses_folder_and_wrong_names_are_refused(tmp_path):
+def test_somebody_elses_folder_is_refused(tmp_path):
     (tmp_path / "thesis.tex").write_text("")
     with pytest.raises(OutputError, match="choose another"):
         carry_out(plan(), tmp_path)
-    with pytest.raises(UnknownNameError, match="no goal 'cellar'"):
-        carry_out(plan(goals=("cellar",)), tmp_path / "out")
-    with pytest.raises(UnknownNameError, match="no SLAM"):
-        carry_out(plan(slams=("shuntin",)), tmp_path / "out")
-    assert not (tmp_path / "out").exists()
-
-
-@pytest.mark.parametrize(
-    ("wrong", "named"),
-    [
-        ({"seeds": (1, 1)}, "seeds"),
-        ({"levels": (1.5,)}, "dynamism"),
-        ({"goals": 0}, "goals"),
-        ({"slams": ()}, "slams"),
-        ({"seeds": (-1,)}, "seeds"),
-    ],
-)
-def test_plans_that_cannot_be_are_refused_by_name(wrong, named):
-    with pytest.raises(InvalidValueError, match=named):
-        plan(**wrong)
 
 
 def test_seeds_and_goals_are_a_number_or_a_list():
     assert _seeds(("2",)) == (100, 101)
     assert _seeds(("3", "7")) == (3, 7)
     assert _seeds(("3:6",)) == (3, 4, 5)
-    with pytest.raises(InvalidValueError, match="--seeds"):
-        _seeds(("many",))
     assert _goals(("2",)) == 2
     assert _goals(("lounge", "copy")) == ("lounge", "copy")
 

@@ -17,32 +17,6 @@ from slam.errors import InvalidValueError
 from slam.frames import Stream, StreamMetadata
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("lifelong", "name exactly one of FOLDER and --scene"),
-        ("lifelong --scene aren", "Did you mean 'arena'"),
-        ("lifelong --scene arena --slam shuntin", "Did you mean 'shunting'"),
-        ("lifelong --scene arena --slam ,", "--slam must name at least one SLAM"),
-        ("lifelong --scene arena --sessions 1", "--sessions must be 2 to 50, got 1"),
-        ("lifelong --scene arena --sessions 51", "--sessions must be 2 to 50, got 51"),
-        ("lifelong --scene arena --first-seconds 0", "--first-seconds must be > 0 and at most"),
-        ("lifelong docs", "docs: holds no sessions"),
-        ("run shunting --scene arena --map-out m.npz", "--map-in, --map-out and --at are about"),
-    ],
-)
-def test_what_cannot_be_done_is_said_in_one_line(called, words, said):
-    ended = called(*words.split())
-    assert ended.returncode == (1 if words == "lifelong docs" else 2)  # of a folder that is there
-    assert said in " ".join(ended.stderr.split())
-
-
-def test_a_folder_that_is_not_there_is_told(called):
-    ended = called("lifelong", "no-such")
-    assert ended.returncode == 2
-    assert "no-such: no such folder" in ended.stderr
-
-
 def test_the_time_of_a_session_is_given_or_the_logs_own():
     stream = Stream(
         metadata=StreamMetadata(source="test", extra={"epoch_ns": 5_000_000_000}), frames=list

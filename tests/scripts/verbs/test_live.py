@@ -14,23 +14,6 @@ from scripts.verbs.live import _serve
 from slam.errors import InvalidValueError
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("live", "name exactly one of a scene, --log and --bag"),
-        ("live arena --log x.log", "name exactly one of a scene, --log and --bag"),
-        ("live aren", "Did you mean 'arena'"),
-        ("live arena --slam shuntin", "Did you mean 'shunting'"),
-        ("live arena --port 70000", "--port must lie in 0..65535, got 70000"),
-        ("live arena --speed 1000", "--speed must lie in [0.05, 20], got 1000"),
-    ],
-)
-def test_what_cannot_be_served_is_said_in_one_line(called, words, said):
-    ended = called(*words.split())
-    assert ended.returncode == 2
-    assert said in " ".join(ended.stderr.split())
-
-
 def test_without_viser_it_says_what_to_install(called, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)
     ended = called("live", "arena")

@@ -12,7 +12,7 @@ import pytest
 from typer.testing import CliRunner
 
 from scripts.cli import app
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import LogFormatError
 
 ROVER = """
 [time]
@@ -82,9 +82,3 @@ def test_the_film_of_a_long_log_is_a_time_lapse(rover, tmp_path):
     film = cv2.VideoCapture(str(out / "film.mp4"))
     assert film.get(cv2.CAP_PROP_FPS) == 10.0
     assert math.isclose(film.get(cv2.CAP_PROP_FRAME_COUNT), 60, abs_tol=2)
-
-
-def test_options_about_a_log_need_one():
-    for words in (("--strict",), ("--format", "rover.toml")):
-        with pytest.raises(InvalidValueError, match="are about a --log"):
-            invoke("odometry", "--scene", "arena", *words)

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import re
-from pathlib import Path
 
 import pytest
 from typer._completion_classes import BashComplete
@@ -12,34 +11,6 @@ from typer.main import get_command
 
 from scripts.cli import app
 from scripts.option_names import OPTIONS_OF, by_option, flowing
-
-
-@pytest.mark.parametrize(
-    ("words", "says"),
-    [
-        ("demo --seconds -3", "--seconds must be > 0 and finite, got -3.0"),
-        ("demo --scan-height 9", "--scan-height must lie in"),
-        ("demo --seed -1", "--seed must be a whole number >= 0, got -1"),
-        ("generate office --seconds -3", "--seconds must be > 0 and at most 86400, got -3.0"),
-        ("generate office --episodes 0", "--episodes must be a whole number from 1"),
-        ("compare --slam odometry --seconds -3", "--seconds must be > 0"),
-        ("compare --slam odometry odometry", "--slam must be one or more, each once"),
-        ("compare --slam odometry --every 0", "--every must be 1 to 1000, got 0"),
-        ("compare --slam odometry --scan-limit -3", "--scan-limit must be > 0 s"),
-        ("compare --slam odometry --sessions 3", "--sessions needs a share of things"),
-        ("compare --slam odometry --change 0.3 --sessions 1", "--sessions must be 2 to 50, got 1"),
-        ("benchmark --slam odometry --days --seconds 40000", "--seconds must be at most 28800"),
-        ("drive arena --slam odometry --seconds -3", "--seconds must lie in (0, 10000]"),
-        ("benchmark --slam odometry --seconds -3", "--seconds must be > 0"),
-        ("blame --scene arena --threshold -3", "--threshold must be > 0"),
-    ],
-)
-def test_the_option_is_named_and_no_field(tmp_path: Path, called, words: str, says: str):
-    done = called(*words.split(), "--out", tmp_path / "out")
-    assert done.returncode == 2
-    assert says in done.stderr
-    assert not re.search(r"\b[A-Z]\w+\.[a-z]", done.stderr)
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_other_words_stay_as_they_are():

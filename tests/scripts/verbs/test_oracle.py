@@ -47,13 +47,6 @@ def test_a_log_has_no_labels(tmp_path: Path, called: Callable[..., SimpleNamespa
     assert not (tmp_path / "out").exists()
 
 
-def test_a_word_that_is_no_oracle_is_one_line(called: Callable[..., SimpleNamespace]):
-    for word, says in (("shuntin", "Did you mean 'shunting'"), ("ekf,often", "movable or moving")):
-        done = called("run", "odometry", "--oracle", word, "--scene", "arena")
-        assert done.returncode == 2
-        assert says in " ".join(done.stderr.split())
-
-
 def test_blame_can_go_back_into_an_oracles_run():
     """Its frames keep their labels on tape, so that a re-run is the original."""
     settings = {"scene": "arena", "dynamism": 1.0, "seed": 2}

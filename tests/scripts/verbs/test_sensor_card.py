@@ -11,14 +11,14 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.card import beside, real, stated
+from scripts.card import beside, stated
 from scripts.card import rows as sensor_rows
+from scripts.card.beside import simulated
 from scripts.card.page import Row, page
-from scripts.card.real import simulated
 from scripts.verbs.sensor_card import sensor_card
 from sim.sensors.lidar.registry import scanner_of
 from sim.sensors.lidar.sheet import NOT_STATED, sheet_of
-from slam.errors import InvalidValueError, MobiliaError, UnknownNameError
+from slam.errors import MobiliaError
 from slam.evaluation.scanner.card import ScannerCard, measure
 
 
@@ -65,19 +65,6 @@ def test_every_row_of_another_scanner_agrees_with_its_data_sheet(name: str) -> N
         assert (row.value is None) == row.text.startswith(NOT_STATED)
         assert row.source or row.value is None
     assert f"| {rows[0].what} |" in "\n".join(page(name, rows))
-
-
-@pytest.mark.parametrize("name", ["full", "utm30lx:noise", "lms221(resolution_deg=0.25)"])
-def test_a_card_is_of_a_whole_model(name: str) -> None:
-    with pytest.raises(InvalidValueError, match=r"a whole model, one of lms221, .*utm30lx; got"):
-        sensor_card(scanner=name)
-
-
-def test_a_scanner_without_a_data_sheet_has_no_card() -> None:
-    with pytest.raises(InvalidValueError, match="'scanner' has no data sheet"):
-        sensor_card(scanner="scanner")
-    with pytest.raises(UnknownNameError, match="Did you mean 'tim561'"):
-        sensor_card(scanner="tim562")
 
 
 # -- beside real logs -----------------------------------------------------------------------------
@@ -146,7 +133,7 @@ def test_a_log_beside_simulated_scans(
 ) -> None:  # fmt: skip
     monkeypatch.setenv("COLUMNS", "200")
     asked = []
-    monkeypatch.setattr(real, "simulated_card", lambda name: asked.append(name) or cards["0.01"])
+    monkeypatch.setattr(beside, "simulated_card", lambda name: asked.append(name) or cards["0.01"])
     sensor_card(log=[flaser(tmp_path / "robot.log")], out=tmp_path / "out")
     assert asked == ["lms221(resolution_deg=1)"]
     page = (tmp_path / "out" / "real_scanner_log.md").read_text()

@@ -69,11 +69,11 @@ def overlaps(simulation: Simulation) -> list[str]:
 def test_the_share_found_elsewhere_is_the_one_asked_for_and_nothing_jumps_in_view(scene):
     for seed, share in enumerate(SHARES, 11):
         simulation, still = made(scene, seed, share), made(scene, seed, 0.0)
-        world = simulation.world
+        world, drawing = simulation.world, simulation.world._rearranging
         as_built = set(overlaps(simulation))  # seats are a little closer
         drawn, elsewhere = set[int](), []
         for k in carried(simulation, 70 if scene == "arena" else 130, seed):
-            before, seen = simulation.save_state(), world.seen_since_drawn()
+            before, seen = simulation.save_state(), drawing.seen()
             frame = simulation.observe()
             labels, moved = frame.labels, {e.name for e in simulation.rearranged}
             assert labels is not None
@@ -85,7 +85,7 @@ def test_the_share_found_elsewhere_is_the_one_asked_for_and_nothing_jumps_in_vie
                 assert np.array_equal(still.observe().scan.ranges, frame.scan.ranges)
             elsewhere += [bool(hit[row] > 0.3) for row in hit.keys() & drawn]
             drawn -= hit.keys()
-            drawn |= set(np.flatnonzero(seen & ~world.seen_since_drawn()).tolist())
+            drawn |= set(np.flatnonzero(seen & ~drawing.seen()).tolist())
         assert set(overlaps(simulation)) <= as_built
         assert len(elsewhere) > 70
         assert np.mean(elsewhere) == pytest.approx(share, abs=0.1)

@@ -69,24 +69,6 @@ def test_truth_is_in_info_only():
     )  # the last half-degree beam of the second turn
 
 
-def test_reward_is_the_progress_towards_the_goal_and_the_goal_ends_the_episode():
-    env = make("mobilia/Arena-v2", dynamism=0.0)
-    _, info = env.reset(seed=1, options={"scene": {"n_chairs": 0}})
-    x, y, theta = info["pose"]
-    goal = (x + 1.2 * math.cos(theta), y + 1.2 * math.sin(theta))
-    _, info = env.reset(seed=1, options={"goal": goal, "scene": {"n_chairs": 0}})
-    start, total, terminated = info["goal_distance"], 0.0, False
-    for _ in range(120):
-        _, reward, terminated, truncated, info = env.step(np.array([1.0, 0.0], np.float32))
-        total += reward
-        if terminated:
-            break
-    assert terminated
-    assert not truncated
-    assert total == pytest.approx(start - info["goal_distance"], abs=1e-9)
-    assert info["goal_distance"] < 0.4
-
-
 def test_without_a_goal_the_reward_is_zero_and_time_truncates():
     env = make("mobilia/Arena-v2", time_limit_s=0.2)
     env.reset(seed=0)

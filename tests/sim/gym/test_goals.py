@@ -116,12 +116,19 @@ def ahead(reward: str, frame_skip: int = 1, speed: float = 1.0, steps: int = 200
     _, info = env.reset(seed=1, options=empty)
     x, y, theta = info["pose"]
     goal = (x + 1.2 * math.cos(theta), y + 1.2 * math.sin(theta))
-    env.reset(seed=1, options={"goal": goal, **empty})
-    rewards, terminated = [], False
+    _, info = env.reset(seed=1, options={"goal": goal, **empty})
+    start, rewards, terminated = info["goal_distance"], [], False
     while not terminated and len(rewards) < steps:
         _, reward_, terminated, _, info = env.step(np.array([speed, 0.0], np.float32))
         rewards.append(reward_)
-    return rewards, info, env.simulation.world.time_ns * 1e-9
+    return rewards, {**info, "start": start}, env.simulation.world.time_ns * 1e-9
+
+
+def test_progress_is_the_way_towards_the_goal_which_ends_the_episode():
+    rewards, info, _ = ahead("progress")
+    assert info["is_success"]
+    assert info["goal_distance"] < 0.4
+    assert sum(rewards) == pytest.approx(info["start"] - info["goal_distance"], abs=1e-9)
 
 
 def test_a_sparse_reward_is_one_at_the_goal_and_nothing_before():
@@ -197,34 +204,3 @@ def test_a_step_of_several_scans_ends_with_the_episode():
 def test_odd_settings_are_refused_when_the_environment_is_made(settings, message):
     with pytest.raises(MobiliaError, match=message):
         MobiliaEnv(**({"scene": "arena"} | settings))
-
-
-def test_many_rooms_have_the_goals_and_rewards_of_the_single_ones():
-    settings = {"time_limit_s": 0.5, "reward": "shaped", "goal": "random", "frame_skip": 3}
-    many = gymnasium.make_vec(
-        "mobilia/Arena-v2",
-        num_envs=2,
-        vectorization_mode="vector_entry_point",
-        autoreset_mode="same_step",
-        **settings,
-    )
-    singles = [make(**settings) for _ in range(2)]
-    seen, infos = many.reset(seed=5)
-    first = [env.reset(seed=5 + i) for i, env in enumerate(singles)]
-    for i, (observation, info) in enumerate(first):
-        assert all(np.array_equal(seen[name][i], observation[name]) for name in observation)
-        assert tuple(infos["goal"][i]) == info["goal"]
-    ended = False
-    while not ended:
-        action = np.array([[0.7, 0.1], [0.4, -0.5]], np.float32)
-        seen, rewards, _, truncated, infos = many.step(action)
-        for i, env in enumerate(singles):
-            observation, reward, _, ended, info = env.step(action[i])
-            assert rewards[i] == reward
-            last = infos["final_obs"][i] if ended else {k: v[i] for k, v in seen.items()}
-            assert all(np.array_equal(last[name], observation[name]) for name in observation)
-            told = infos["final_info"] if ended else infos
-            assert told["goal_distance"][i] == info["goal_distance"]
-            assert truncated[i] == ended
-    assert many.observation_space.contains(seen)
-    many.close()

@@ -9,6 +9,7 @@ import pytest
 from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import sim  # noqa: F401  (registers the environments)
+from sim.gym.vector import MobiliaVectorEnv
 from slam import create, se2
 from slam.errors import InvalidValueError, SlamFailedError, UnknownNameError
 from slam.odometry import OdometrySlam
@@ -92,6 +93,8 @@ def test_what_is_no_source_is_refused():
     for wrong in (7, object(), [1.0, 2.0]):
         with pytest.raises(InvalidValueError, match="pose_source must be"):
             make(wrong)
+    with pytest.raises(InvalidValueError, match="pose_source must be a name for 2 environments"):
+        MobiliaVectorEnv(2, scene="arena", pose_source=create("odometry"))
 
 
 class OverFiles(OdometrySlam):
@@ -102,26 +105,3 @@ class OverFiles(OdometrySlam):
 def test_a_slam_that_runs_at_the_end_only_is_refused():
     with pytest.raises(InvalidValueError, match="no pose before the last scan, and an environment"):
         make(OverFiles())
-
-
-def many(source, n=2):
-    return gymnasium.make_vec(
-        "mobilia/Arena-v2", num_envs=n, vectorization_mode="vector_entry_point", pose_source=source
-    )
-
-
-def test_rooms_side_by_side_have_a_slam_each_and_share_none():
-    env = many("odometry")
-    env.reset(seed=3, options={"goal": GOAL})
-    for k in range(4):
-        seen = env.step(np.full((2, 2), 0.2 * k, np.float32))[0]
-    single = make("odometry")
-    single.reset(seed=4, options={"goal": GOAL})
-    for k in range(4):
-        other = single.step(np.full(2, 0.2 * k, np.float32))[0]
-    assert seen["pose"].shape == (2, 3)
-    assert env.observation_space.contains(seen)
-    np.testing.assert_array_equal(seen["pose"][1], other["pose"])
-    np.testing.assert_array_equal(seen["goal"][1], other["goal"])
-    with pytest.raises(InvalidValueError, match="pose_source must be a name for 2 environments"):
-        many(create("odometry"))

@@ -29,17 +29,25 @@ def actions(step: int) -> np.ndarray:
     return np.array([[0.6, 0.3 * i - 0.2 * (step % 3)] for i in range(N)], dtype=np.float32)
 
 
+GOALS = {
+    "time_limit_s": 0.75, "reward": "shaped", "goal": "random", "frame_skip": 3,
+    "pose_source": "odometry",
+}  # fmt: skip
+
+
 @pytest.mark.parametrize("n_threads", [1, 2])
-@pytest.mark.parametrize("mode", ["next_step", "same_step"])
-def test_it_is_the_single_environments_through_resets(mode, n_threads):
-    many = make(autoreset_mode=mode, n_threads=n_threads)
+@pytest.mark.parametrize(
+    ("mode", "more"), [("next_step", {}), ("same_step", {}), ("same_step", GOALS)]
+)
+def test_it_is_the_single_environments_through_resets(mode, more, n_threads):
+    many = make(autoreset_mode=mode, n_threads=n_threads, **more)
     singles = gymnasium.make_vec(
         "mobilia/Arena-v2",
         num_envs=N,
         vectorization_mode="sync",
         vector_kwargs={"autoreset_mode": gymnasium.vector.AutoresetMode[mode.upper()]},
         disable_env_checker=True,
-        **SETTINGS,
+        **{**SETTINGS, **more},
     )
     ours, theirs = many.reset(seed=5)[0], singles.reset(seed=5)[0]
     assert data_equivalence(ours, theirs, exact=True)
@@ -47,7 +55,8 @@ def test_it_is_the_single_environments_through_resets(mode, n_threads):
     for k in range(STEPS):
         ours, theirs = many.step(actions(k)), singles.step(actions(k))
         assert data_equivalence(ours[:4], theirs[:4], exact=True)
-        np.testing.assert_array_equal(ours[4]["pose"], np.stack(theirs[4]["pose"]))
+        for name in ("pose", "goal", "goal_distance") if more else ("pose",):
+            np.testing.assert_array_equal(ours[4][name], np.stack(theirs[4][name]))
         if "final_obs" in theirs[4]:
             assert data_equivalence(
                 list(ours[4]["final_obs"]), list(theirs[4]["final_obs"]), exact=True

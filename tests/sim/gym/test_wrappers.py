@@ -52,7 +52,7 @@ def test_many_rooms_look_as_the_single_ones():
     many = gymnasium.make_vec(
         "mobilia/Arena-v2", num_envs=2, vectorization_mode="vector_entry_point", **SETTINGS
     )
-    many = wrappers.VectorGoalVector(wrappers.VectorLidarMinPooling(many))
+    many = wrappers.GoalVector(wrappers.LidarMinPooling(many))
     single = wrappers.GoalVector(wrappers.LidarMinPooling(make(**SETTINGS)))
     seen, _ = many.reset(seed=3)
     assert many.observation_space.contains(seen)

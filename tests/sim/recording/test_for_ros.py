@@ -19,7 +19,7 @@ import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
-from scripts.figures import in_first_frame
+from scripts.metrics.judged import in_first_frame
 from scripts.single_run.run import Log, on_log
 from scripts.verbs.generate import generate
 from sim.moments import toured

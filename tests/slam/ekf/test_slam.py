@@ -105,7 +105,7 @@ def test_corners_of_an_arena_are_enough():
     assert np.all(ellipses[:, 3] > 0.0)
 
 
-@pytest.mark.parametrize("association", ["ipjc", "jcbb", "individual"])
+@pytest.mark.parametrize("association", ["ipjc", "individual"])
 @pytest.mark.parametrize("exact_odometry", [True, False])
 @pytest.mark.parametrize("exact_in", ["all", "range"])
 def test_exact_features_and_odometry_do_not_end_a_run(association, exact_odometry, exact_in):
@@ -255,7 +255,7 @@ def test_the_same_bytes_without_the_vector_units_of_the_cpu():
     )
     runs = [
         ({"occluder_m": 0.3}, points),
-        ({"association": "jcbb", "individual_gate": 0.99}, points[:8]),
+        ({"association": "individual", "individual_gate": 0.99}, points[:8]),
         ({"preset": "corners"}, scans),
     ]
     found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Poses with covariances are read back as written, and stand in the robot's frame in the file."""
+"""Poses with covariances stand in the file as written, in the robot's frame."""
 
 from __future__ import annotations
 
@@ -9,8 +9,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from slam.errors import InvalidValueError, LogFormatError
-from slam.evaluation.wide_tum import FLAT, ROUNDING, read_wide_tum, to_body, to_map, write_wide_tum
+from slam.errors import InvalidValueError
+from slam.evaluation.wide_tum import FLAT, PLANAR, ROUNDING, to_body, write_wide_tum
 from slam.frames import NS_PER_S
 from slam.trajectory import Trajectory
 
@@ -25,14 +25,13 @@ def made(seed: int = 0) -> tuple[Trajectory, np.ndarray]:
     return Trajectory(stamps_ns=stamps, poses=poses), roots @ roots.transpose(0, 2, 1)
 
 
-def test_poses_and_covariances_are_read_back(tmp_path: Path):
-    trajectory, covariances = made()
-    write_wide_tum(tmp_path / "a.tum", trajectory, covariances)
-    back, theirs = read_wide_tum(tmp_path / "a.tum")
-    assert np.array_equal(back.stamps_ns, trajectory.stamps_ns)
-    assert np.array_equal(back.poses[:, :2], trajectory.poses[:, :2])
-    np.testing.assert_allclose(back.poses[:, 2], trajectory.poses[:, 2], atol=1e-14)
-    np.testing.assert_allclose(theirs, covariances, rtol=1e-9, atol=1e-16)
+def written(path: Path) -> np.ndarray:
+    """(n, 3, 3) the covariances of a file, of x, y and heading in the robot's frame."""
+    rows = np.atleast_2d(np.loadtxt(path))
+    whole = np.zeros((len(rows), 6, 6))
+    whole[:, *np.tril_indices(6)] = rows[:, 8:]
+    lower = whole[np.ix_(range(len(rows)), PLANAR, PLANAR)]
+    return lower + np.tril(lower, -1).transpose(0, 2, 1)
 
 
 def test_a_line_is_a_pose_and_the_lower_triangle_by_rows(tmp_path: Path):
@@ -68,15 +67,13 @@ def test_an_error_is_as_unlikely_in_both_frames(theta: float):
     seen = np.array([c * 0.02 - s * 0.03, -s * 0.02 - c * 0.03, 0.0, 0.0, 0.0, 0.01])
     nees = error @ np.linalg.solve(covariance, error)
     assert seen @ np.linalg.solve(whole, seen) == pytest.approx(nees, rel=1e-6)
-    np.testing.assert_allclose(to_map(whole, theta), covariance, atol=1e-16)
 
 
 def test_the_known_start_gets_a_variance_that_can_be_inverted(tmp_path: Path):
     trajectory, covariances = made()
     covariances[0] = 0.0
     write_wide_tum(tmp_path / "a.tum", trajectory, covariances)
-    _, back = read_wide_tum(tmp_path / "a.tum")
-    assert np.linalg.eigvalsh(back).min() >= FLAT / 2.0
+    assert np.linalg.eigvalsh(written(tmp_path / "a.tum")).min() >= FLAT / 2.0
 
 
 def turned(least: float, skew: float = 0.0) -> np.ndarray:
@@ -93,8 +90,9 @@ def test_rounding_is_a_part_of_the_covariance_whatever_its_size(tmp_path: Path, 
     part = 1.5 * ROUNDING  # of the eigenvalues of ``turned``: their sum is 1.5
     for fine in (turned(-0.9 * part), turned(0.0, 0.9 * part)):
         write_wide_tum(tmp_path / "a.tum", pose, scale * fine)
-        _, back = read_wide_tum(tmp_path / "a.tum")
-        np.testing.assert_allclose(back, scale * fine, atol=2.0 * part * scale + 2.0 * FLAT)
+        back = written(tmp_path / "a.tum")
+        expected = to_body(scale * fine[0], 0.5)[np.ix_(PLANAR, PLANAR)]
+        np.testing.assert_allclose(back[0], expected, atol=2.0 * part * scale + 2.0 * FLAT)
         assert np.linalg.eigvalsh(back).min() >= FLAT / 2.0
     for bad, says in (
         (turned(-1.2 * part), "positive semidefinite, got an eigenvalue of -"),
@@ -121,23 +119,3 @@ def test_what_cannot_be_scored_is_refused_and_nothing_written(tmp_path: Path, ch
     with pytest.raises(InvalidValueError, match="algorithm must be one line"):
         write_wide_tum(tmp_path / "a.tum", trajectory, covariances, algorithm="a\nb")
     assert not list(tmp_path.iterdir())
-
-
-@pytest.mark.parametrize(
-    ("change", "says"),
-    [
-        (lambda words: words[:-1], "expected 29 numbers, found 28"),
-        (lambda words: words[:8], "expected 29 numbers, found 8"),
-        (lambda words: [*words[:-1], "nan"], "finite numbers in the covariance"),
-        (lambda words: [*words[:8], "-1", *words[9:]], "variances >= 0, found -1"),
-        (lambda words: [*words[:9], "x", *words[10:]], "could not convert"),
-        (lambda words: ["0.5", *words[1:]], "time does not increase"),
-    ],
-)
-def test_a_bad_line_is_told_by_its_number(tmp_path: Path, change, says):
-    write_wide_tum(tmp_path / "a.tum", *made())
-    lines = (tmp_path / "a.tum").read_text().splitlines()
-    lines[20] = " ".join(change(lines[20].split()))
-    (tmp_path / "a.tum").write_text("\n".join(lines))
-    with pytest.raises(LogFormatError, match=rf"a\.tum.*21.*{says}"):
-        read_wide_tum(tmp_path / "a.tum")

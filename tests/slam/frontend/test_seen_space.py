@@ -11,7 +11,6 @@ import pytest
 from slam.errors import InvalidValueError
 from slam.frames import LaserSpec, Scan
 from slam.frontend.seen_space import SeenSpace
-from slam.strips import of_raster
 from slam.system import Raster
 
 SPEC = LaserSpec(n_beams=181, angle_min=-math.pi / 2, angle_increment=math.radians(1.0))
@@ -33,7 +32,7 @@ def blank(extent: float = 0.3, step: float = 0.1) -> Raster:
 
 @pytest.mark.parametrize("pose", [(0.0, 0.0, 0.0), (3.3, -17.2, 2.0), (-40.0, 12.0, -1.0)])
 def test_a_half_disc_of_free_space_has_its_area_and_place(pose):
-    raster = half_disc(4.0, pose).merge(of_raster(blank())).whole()
+    raster = half_disc(4.0, pose).merge(blank())
     free = np.argwhere(raster.values == 0.0)
     area = len(free) * raster.resolution_m**2
     assert area == pytest.approx(math.pi * 16.0 / 2.0, rel=0.05)
@@ -47,7 +46,7 @@ def test_what_is_there_stays_and_what_was_not_seen_stays_unknown():
     values = np.full((60, 60), np.nan, np.float32)
     values[10, 20], values[5, 55] = 0.9, 0.8  # the second lies behind the robot's sight
     raster = Raster(values=values, resolution_m=0.1, T_map_origin=np.array([-1.0, -1.0, 0.0]))
-    merged = half_disc(2.0, (0.0, 0.0, 0.0)).merge(of_raster(raster)).whole()
+    merged = half_disc(2.0, (0.0, 0.0, 0.0)).merge(raster)
     assert np.nanmax(merged.values) == np.float32(0.9)
     assert (merged.values == np.float32(0.8)).sum() == 1
     assert np.isnan(merged.values).any()
@@ -58,7 +57,7 @@ def test_errors_and_missing_returns_claim_little():
     ranges[::2] = np.nan
     seen = SeenSpace(0.1)
     seen.add(Scan(stamp_ns=0, ranges=ranges, spec=SPEC), np.zeros(3))
-    free = (seen.merge(of_raster(blank())).whole().values == 0.0).sum()
+    free = (seen.merge(blank()).values == 0.0).sum()
     assert free <= 1  # the cell of the scanner
 
 
@@ -69,14 +68,14 @@ def test_a_fan_of_lost_beams_and_what_is_behind_a_window_stay_unknown():
     ranges[90] = 50.0
     seen = SeenSpace(0.05)
     seen.add(Scan(stamp_ns=0, ranges=ranges, spec=SPEC), np.zeros(3))
-    values = seen.merge(of_raster(blank())).whole()
+    values = seen.merge(blank())
     columns = np.nonzero(values.values == 0.0)[1]
     far = columns * values.resolution_m + values.T_map_origin[0] > 3.1
     assert far.sum() * values.resolution_m**2 < 0.1
 
 
 def test_nothing_seen_changes_nothing():
-    strips = of_raster(blank())
-    assert SeenSpace().merge(strips) is strips
+    raster = blank()
+    assert SeenSpace().merge(raster) is raster
     with pytest.raises(InvalidValueError, match="resolution_m"):
         SeenSpace(0.0)

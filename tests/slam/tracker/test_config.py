@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("c5e096b75d58", "47d2beb86ea3")),
-        (OccupancyConfig, ["grid"], ("f42399ccfb15", "a984a670a6c5")),
+        (ShuntingConfig, [], ("c615b01d5f97", "b2064ccc9edb")),
+        (OccupancyConfig, ["grid"], ("4574f2c24d2b", "e5d8dc7c2924")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

@@ -3,17 +3,13 @@
 
 from __future__ import annotations
 
-import itertools
-import math
-
 import numpy as np
 import pytest
 
-from sim.sensors.lidar.link import SerialLink, partial_scans
+from sim.sensors.lidar.link import SerialLink
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import stream
 from slam.errors import InvalidValueError
-from slam.frames import Scan
 
 
 def link(baud: int, resolution: float, fov: int = 180) -> SerialLink:
@@ -78,32 +74,3 @@ def test_what_the_device_cannot_send_is_refused() -> None:
     with pytest.raises(InvalidValueError, match="turn by turn"):
         link(38_400, 0.25)
     assert link(500_000, 0.25).telegram_bytes == 362
-
-
-@pytest.mark.parametrize("resolution", [0.5, 0.25])
-def test_each_mirror_turn_is_a_message_of_one_degree_steps(resolution: float) -> None:
-    config = Lms221Config(resolution_deg=resolution)
-    spec = config.spec(np.array([0.1, 0.0, 0.0]))
-    ranges = np.linspace(1.0, 9.0, spec.n_beams).astype(np.float32)
-    scan = Scan(stamp_ns=7_000_000, ranges=ranges, spec=spec)
-    parts = partial_scans(scan, config)
-    assert [p.spec.n_beams for p in parts] == [181, *[180] * (config.turns - 1)]
-    for k, part in enumerate(parts):
-        assert math.degrees(part.spec.angle_increment) == pytest.approx(1.0)
-        assert math.degrees(part.spec.angle_min) == pytest.approx(-90.0 + k * resolution)
-        np.testing.assert_array_equal(part.ranges, ranges[k :: config.turns])
-        np.testing.assert_allclose(part.spec.angles, spec.angles[k :: config.turns], atol=1e-12)
-        at = part.stamp_ns + part.spec.beam_time_offsets * 1e9
-        want = scan.stamp_ns + spec.beam_time_offsets[k :: config.turns] * 1e9
-        np.testing.assert_allclose(at, want, atol=2.0)
-        np.testing.assert_array_equal(part.spec.T_robot_laser, spec.T_robot_laser)
-    assert all(b.stamp_ns > a.stamp_ns for a, b in itertools.pairwise(parts))
-
-
-def test_whole_turns_and_narrow_scans_stay_whole() -> None:
-    for config in (Lms221Config(resolution_deg=1.0), Lms221Config(fov_deg=100)):
-        spec = config.spec()
-        scan = Scan(stamp_ns=0, ranges=np.ones(spec.n_beams, np.float32), spec=spec)
-        assert partial_scans(scan, config) == [scan]
-    with pytest.raises(InvalidValueError, match="expected 361"):
-        partial_scans(scan, Lms221Config())

@@ -89,15 +89,26 @@ def test_bearings_on_a_turning_robot_are_those_of_each_beams_own_time(
     assert abs(still[1][0] - scans[1][0]) > 1e-3  # the robot does turn
 
 
-def test_a_scan_of_40_hz_lies_over_seven_and_a_half_steps(room: SimpleNamespace) -> None:
+@pytest.mark.parametrize(
+    ("name", "steps"),
+    [
+        ("utm30lx", [8, 15, 23, 30]),  # 40 Hz: seven and a half each
+        ("lms221(resolution_deg=1)", [4, 8, 12, 16]),  # a turn of the mirror
+        ("lms221", [8, 16, 24, 32]),
+        ("lms221(resolution_deg=0.25)", [16, 32, 48, 64]),
+    ],
+)
+def test_a_scan_ends_with_the_step_of_its_last_beam(
+    room: SimpleNamespace, name: str, steps: list[int]
+) -> None:
     world, data = room.build()
-    lidar = LaserScanner(world, "utm30lx:ideal")
+    lidar = LaserScanner(world, f"{name}:ideal")
     advance = room.stepper(world, data)
     ends = []
     for _ in range(4):
         lidar.observe(advance, data)
         ends.append(round(data.time * 300.0))
-    assert ends == [8, 15, 23, 30]
+    assert ends == steps
 
 
 def driven(laser: str, scans: int) -> tuple[list[Frame], list[np.ndarray]]:
@@ -131,6 +142,8 @@ def test_stamps_are_exact_and_truth_and_odometry_are_at_them(name: str, rate_hz:
 @pytest.mark.parametrize(
     ("name", "at_m", "sigma_m"),
     [
+        ("lms221", 5.0, 0.010),  # TD p34: 10 mm, rounding included
+        ("lms221(range_mode=32m)", 5.0, 0.010),
         ("utm30lx", 5.0, 0.010),
         ("utm30lx", 20.0, 0.030),
         ("tim561", 5.0, 0.020),
@@ -197,7 +210,7 @@ def same(ours: Frame, theirs: Frame) -> bool:
     )
 
 
-@pytest.mark.parametrize("name", MODELS)
+@pytest.mark.parametrize("name", ["lms221", *MODELS])
 def test_one_seed_gives_the_same_bytes(name: str) -> None:
     settings = {"seed": 5, "dynamism": 1.0, "laser": name, "seconds": 1.0}
     first, again = (list(stream("arena", **settings)) for _ in range(2))

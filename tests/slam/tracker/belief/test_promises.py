@@ -11,7 +11,6 @@ import numpy as np
 import pytest
 
 from slam.frontend.observations import observe
-from slam.grid import OccupancySlam
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.episode import Episode
 from slam.tracker.belief.posterior import Odds
@@ -41,20 +40,8 @@ ELSEWHERE = Drive((-2.6, 1.5, 2.2), ((0.0, 0.3, 16.0),))
 OTHER_PLACES = [(2.0, -2.0, 2.0), (-2.6, 1.5, 2.2), (3.0, 2.5, -1.0), (-3.5, -2.8, 0.4)]
 
 
-@pytest.mark.parametrize(
-    ("kind", "place"),
-    [
-        pytest.param(
-            kind,
-            place,
-            marks=pytest.mark.xfail(reason="a grid in a corner takes a place alike: docs/belief.md")
-            if kind is OccupancySlam and place == OTHER_PLACES[1]
-            else (),
-        )
-        for kind in SLAMS
-        for place in OTHER_PLACES
-    ],
-)
+@pytest.mark.parametrize("kind", SLAMS)
+@pytest.mark.parametrize("place", OTHER_PLACES)
 def test_a_carried_robot_is_found_and_at_no_wrong_place(kind: type[Tracker], place: Pose) -> None:
     """Whatever it says that is to be believed is right, and the map is not written till then."""
     system, last = mapped(ROOMS, LONG_TURN, kind)

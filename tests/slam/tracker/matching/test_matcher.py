@@ -35,6 +35,15 @@ def join(
     surfaces.join(points, beams, origin, near, out, tangents)
 
 
+@njit
+def follow_ends(
+    points: Array, beams: Array, origin: Array, joined: Array, sweep: tuple[float, int, float],
+    tangents: Array,
+) -> None:  # fmt: skip
+    """Only other kernels can call it."""
+    surfaces.follow_ends(points, beams, origin, joined, sweep, tangents)
+
+
 def room_scan(pose: Array, n_beams: int = 181) -> Scan:
     spec = laser(n_beams)
     poses = np.tile(se2.compose(pose, spec.T_robot_laser), (n_beams, 1))
@@ -136,6 +145,29 @@ def test_returns_of_one_wall_are_joined_and_those_across_a_gap_are_not() -> None
     beams[5:] += 1  # a beam without a return between the fifth and the sixth
     join(points, beams, np.array([2.0, 0.0, 0.0]), 0.1, joined, tangents)
     assert not joined[4]
+
+
+def test_a_surface_ends_only_where_a_beam_sees_past_it() -> None:
+    """A wall along y = 1 from x = 0 to 2, seen from the origin by a beam every 2 degrees."""
+    angles = np.radians(np.arange(28.0, 90.1, 2.0))
+    points = np.stack([1.0 / np.tan(angles), np.ones(len(angles))], axis=1)
+    behind, nearer = np.array([[4.5, 2.2]]), np.array([[0.9, 0.44]])
+    increment, n = math.radians(2.0), len(points)
+    for first, range_m, ends in (
+        (behind, 10.0, True),  # the beam beside its last hit goes on far behind it
+        (nearer, 10.0, False),  # something hides the rest
+        (None, 1.9, False),  # the rest is out of range
+        (None, 10.0, True),  # it is not, and yet there is no return
+    ):
+        seen = points if first is None else np.vstack([first, points])
+        beams = np.arange(n + 1)[-len(seen) :]
+        joined, tangents = np.zeros(len(seen), np.bool_), np.zeros((len(seen), 2))
+        join(seen, beams, np.zeros(3), 0.15, joined, tangents)
+        follow_ends(seen, beams, np.zeros(3), joined, (increment, n + 1, range_m), tangents)
+        end = len(seen) - n
+        assert (not tangents[end].any()) == ends
+        assert ends or abs(tangents[end, 0]) == pytest.approx(1.0)
+        assert abs(tangents[-1, 0]) == pytest.approx(1.0)  # at the edge of the field of view
 
 
 def test_table_legs_in_line_with_a_wall_are_not_joined_to_it() -> None:

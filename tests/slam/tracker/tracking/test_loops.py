@@ -16,6 +16,7 @@ from slam.posegraph import Edge
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.map.network import Network
 from slam.tracker.matching.matcher import Matcher
+from slam.tracker.tracking import closures
 from slam.tracker.tracking.loops import Loops
 from tests.world2d import Drive, World2D, frames, laser, office, office_loop, rectangle
 
@@ -74,6 +75,19 @@ def test_a_drifted_way_is_bent_back_onto_itself(drifted: Drifted) -> None:
     assert left[-1] < 0.12
     assert left.max() < 0.6 * error.max()
     np.testing.assert_array_equal(graph.corrected(poses), corrected)
+
+
+def test_the_graph_does_not_depend_on_how_many_submaps_are_kept(
+    drifted: Drifted, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    found = []
+    for kept in (closures.KEPT, 1):
+        monkeypatch.setattr(closures, "KEPT", kept)
+        graph = filled(Loops(CONFIG, Matcher(CONFIG), lambda: Network(CONFIG)), drifted)
+        finish(graph)
+        assert len(graph.closures._submaps) <= kept
+        found.append(graph.corrected(drifted[2]))
+    np.testing.assert_array_equal(*found)
 
 
 class Aliased(Loops):

@@ -125,7 +125,7 @@ def test_residuals_of_noise_are_not_shared_and_a_moved_wall_is() -> None:
             ranges = scan.ranges + np.float32(longer)
             moved = Scan(stamp_ns=scan.stamp_ns, ranges=ranges, spec=scan.spec)
             seen = from_scan(moved, np.zeros(3), CONFIG)
-            evidence = look(network, 0.3, seen, np.zeros(3), 0.2, turn)
+            evidence = look(network, 0.3, seen, np.zeros(3), (0.2, 0.0), turn)
             shared, paired = shared + evidence.shared, paired + evidence.paired
         totals[name] = shared / paired
     assert abs(totals["noise"]) < 0.003**2
@@ -158,7 +158,7 @@ def test_innovations_have_the_nis_of_prior_and_match_together() -> None:
         gain = np.linalg.solve(data + np.linalg.inv(prior), data)
         root = np.linalg.cholesky(prior + R)
         values = [
-            innovation(prior, prior, data, gain @ root @ rng.normal(size=3), share)[0]
+            innovation(prior, prior, data, gain @ root @ rng.normal(size=3), share, (0.0, 0.0))[0]
             for _ in range(3000)
         ]
         assert np.mean(values) == pytest.approx(3.0, abs=0.2)
@@ -251,6 +251,7 @@ def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
         paired=20.0,
         feigned=0.0,
         new=0.0,
+        new_geometry=np.zeros(3),
     )
     still = Prediction(
         T_map_robot=np.zeros(3),
@@ -315,12 +316,64 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
             paired=20.0,
             feigned=0.0,
             new=20.0 * new,
+            new_geometry=20.0 * new * np.array([0.5, 0.0, 0.5]),
         )
         pose_covariance.update(T, drive, match, evidence)
         left[new] = pose_covariance.covariance[0, 0] / blind
         assert np.linalg.eigvalsh(pose_covariance.covariance)[0] > 0.0
     assert left[0.0] < 0.05
     assert left[0.2] == pytest.approx(2.4 * 0.2, abs=0.05)
+
+
+def test_a_new_end_wall_does_not_tell_how_far_the_robot_has_come() -> None:
+    """At the end of a bare corridor only what was never seen before fixes the position along it:
+    odometry's error stays. An end wall of old takes it away."""
+    T, sigma_m, steps = np.zeros(3), 0.01, 100
+    drive = Prediction(
+        T_map_robot=T, increment=T, covariance=np.diag([sigma_m**2, sigma_m**2, 1e-8]), twist=T,
+        elapsed=0.1,
+    )  # fmt: skip
+    walls, both = np.diag([0.0, 1.0, 4.0]), np.diag([0.3, 0.7, 4.0])
+    left = {}
+    for new in (0.0, 1.0):  # share of the end wall that is new
+        pose_covariance = PoseCovariance(ShuntingConfig())
+
+        def see(geometry: Float, new: float, to: PoseCovariance = pose_covariance) -> None:
+            match = Match(
+                T_map_robot=T, information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0
+            )
+            to.update(T, drive, match, Evidence(
+                geometry=20.0 * geometry, weighed=20.0, in_view=75.0, shared=0.0, paired=20.0,
+                feigned=0.0, new=0.0, new_geometry=20.0 * np.array([new * geometry[0, 0], 0, 0]),
+            ))  # fmt: skip
+
+        for _ in range(steps):
+            see(walls, 0.0)
+        assert pose_covariance.unobservable == 1
+        assert pose_covariance.unseen_s == pytest.approx(0.1 * steps)
+        for _ in range(20):
+            see(both, new)
+        assert pose_covariance.unobservable == 0
+        left[new] = math.sqrt(pose_covariance.covariance[0, 0]) / (sigma_m * math.sqrt(steps))
+        assert math.sqrt(pose_covariance.covariance[1, 1]) < 0.02
+    assert left[0.0] < 0.1
+    assert left[1.0] == pytest.approx(1.0, abs=0.1)
+
+
+def test_a_corridor_tells_odometrys_noise_across_it() -> None:
+    """What is assumed is half of the true deviation; no match says anything along the corridor."""
+    noise, rng = OdometryNoise.of_beams(ShuntingConfig()), np.random.default_rng(3)
+    before = Odometry(stamp_ns=0, T_odom_robot=np.zeros(3))
+    for k in range(1, 301):
+        now = Odometry(stamp_ns=k * 10**8, T_odom_robot=np.array([0.05 * k, 0.0, 0.0]))
+        prediction = noise.predict(np.zeros(3), before, now)
+        truth = prediction.T_map_robot.copy()
+        truth[1] += 0.01 * rng.normal()  # a fifth of the step; a tenth is assumed
+        information = np.diag([0.0, 1e8, 1e8])
+        match = Match(T_map_robot=truth, information=information, matched=1.0, score=0.0, tau=1.0)
+        noise.learn(prediction, match, 0.01, along_rad=0.0)
+        before = now
+    assert noise.scales[0] == pytest.approx(4.0, rel=0.4)
 
 
 @pytest.mark.parametrize("blind_s", [700.0, 16000.0])
@@ -335,6 +388,7 @@ def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
         paired=0.0,
         feigned=0.0,
         new=0.0,
+        new_geometry=np.zeros(3),
     )
     still = Prediction(
         T_map_robot=T,

@@ -1,0 +1,135 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Wrong words after every verb: one line that names what was typed, a status, nothing written."""
+
+from __future__ import annotations
+
+import re
+from pathlib import Path
+
+import pytest
+
+WITHOUT_OUT = ("config", "live", "render", "report")
+
+WRONG = [
+    ("demo --scene ofice", "Did you mean 'office'"),
+    ("demo --dynamism 2", "dynamism must lie in [0, 1], got 2.0"),
+    ("demo --seconds -3", "--seconds must be > 0 and finite, got -3.0"),
+    ("demo --scan-height 9", "--scan-height must lie in"),
+    ("demo --seed -1", "--seed must be a whole number >= 0, got -1"),
+    ("run shunting", "exactly one of --log and --scene"),
+    ("run shunting --log missing.log", "missing.log: no such file"),
+    ("run shunting --log 'nope [/x].log'", "nope [/x].log: no such file"),
+    ("run shunting --log '[red]gone[/red].log'", "[red]gone[/red].log: no such file"),
+    ("run shuntin --scene arena", "Did you mean 'shunting'"),
+    ("run no_module:Slam --scene arena", "cannot import 'no_module'"),
+    ("run odometry --oracle shuntin --scene arena", "Did you mean 'shunting'"),
+    ("run odometry --oracle ekf,often --scene arena", "movable or moving"),
+    ("run odometry --scene arena --strict", "are about a --log"),
+    ("run odometry --scene arena --format rover.toml", "are about a --log"),
+    ("run shunting --scene arena --map-out m.npz", "--map-in, --map-out and --at are about"),
+    ("generate office --seconds -3", "--seconds must be > 0 and at most 86400, got -3.0"),
+    ("generate office --episodes 0", "--episodes must be a whole number from 1"),
+    ("generate arena --jobs 0", "--jobs must be 1"),
+    ("generate arena --dynamism-sweep 0:1:0", "step > 0"),
+    ("generate arena --dynamism-sweep 0:1", "start:stop:step"),
+    ("generate arena --dynamism-sweep 0:2:0.5", "stop <= 1"),
+    ("generate arena --dynamism-sweep 0:1:1e-9", "at most"),
+    ("generate arena --dynamism 1.5", "dynamism must lie in"),
+    ("generate arena --split train", "--split must be names with numbers"),
+    ("generate arena --split train:0", "--split must be names with numbers"),
+    ("generate arena --split train:1,train:2", "--split must be names with numbers"),
+    ("generate arena --split ../x:1", "--split must be names with numbers"),
+    ("generate arena --split train:1 --episodes 3", "leave --episodes out"),
+    ("generate arena --split train:2 --sessions 2", "--sessions are of one building"),
+    ("generate arena arena", "scene must be different"),
+    ("generate arenas", "Did you mean 'arena'"),
+    ("generate arena --scanner lidar", "Did you mean 'rplidar_a1'"),
+    ("generate arena --dynamism 0 1 --motion 0.2 --change 0.1", "all levels are the same"),
+    ("compare --slam odometry --seconds -3", "--seconds must be > 0"),
+    ("compare --slam odometry odometry", "--slam must be one or more, each once"),
+    ("compare --slam odometry --every 0", "--every must be 1 to 1000, got 0"),
+    ("compare --slam odometry --scan-limit -3", "--scan-limit must be > 0 s"),
+    ("compare --slam odometry --sessions 3", "--sessions needs a share of things"),
+    ("compare --slam odometry --change 0.3 --sessions 1", "--sessions must be 2 to 50, got 1"),
+    ("compare --slam shuntin", "Did you mean 'shunting'"),
+    ("compare --slam odometry --scene arenna", "Did you mean 'arena'"),
+    ("compare --slam odometry --scanner rplidar_a2", "Did you mean 'rplidar_a1'"),
+    ("compare --slam odometry --dynamism much", "--dynamism must"),
+    ("compare --slam odometry --dynamism 2", "[0, 1]"),
+    ("compare --slam odometry --people 81", "--people must be"),
+    ("compare --slam odometry --motion 0 1 --change 0 1", "--motion and --change"),
+    ("compare --slam odometry --dynamism 0.5 --motion 0 1", "--dynamism sets both"),
+    ("compare --slam odometry --seconds 0.1", "needs 2 scans a run"),
+    ("benchmark --slam odometry --days --seconds 40000", "--seconds must be at most 28800"),
+    ("benchmark --slam odometry --seconds -3", "--seconds must be > 0"),
+    ("benchmark --tracks nowhere", "no track is called 'nowhere'"),
+    ("benchmark --seeds 21", "--seeds must be 1 to 20"),
+    ("benchmark --slam odometri", "Did you mean 'odometry'?"),
+    ("benchmark --submit a/b", "up to 40 letters"),
+    ("benchmark --slam ekf --submit karto", "the name of another SLAM"),
+    ("benchmark --merge nothing.json", "nothing.json: no such file"),
+    ("drive arena --slam odometry --seconds -3", "--seconds must lie in (0, 10000]"),
+    ("drive arena --slam odometry --seeds 1 1", "--seeds must be"),
+    ("drive arena --slam odometry --seeds many", "--seeds must be"),
+    ("drive arena --slam odometry --seeds=-1", "--seeds must be"),
+    ("drive arena --slam odometry --dynamism 1.5", "--dynamism must"),
+    ("drive arena --slam odometry --goals 0", "--goals must be"),
+    ("drive arena --slam odometry --goals cellar table", "no goal 'cellar'"),
+    ("drive arena --slam ,", "--slam must"),
+    ("drive arena --slam shuntin", "Did you mean 'shunting'"),
+    ("blame", "name exactly one of RUN and --scene"),
+    ("blame nowhere", "nowhere: no such folder"),
+    ("blame --scene arena --threshold -3", "--threshold must be > 0"),
+    ("blame --scene arena --threshold 0", "--threshold must be > 0"),
+    ("blame --scene arena --every 0", "--every must be a whole number >= 1"),
+    ("blame --scene arena --horizon -1", "--horizon must be > 0 s"),
+    ("blame --scene arena --top -1", "--top must be a whole number >= 0"),
+    ("blame --scene arena --option walls", "--option must be NAME=VALUE"),
+    ("blame --scene arena --option seed=4", "--option seed: that has an option"),
+    ("blame --scene arena --option wall=no", "cannot take these options"),
+    ("blame --scene arena --seconds 1 --at 7", "--at must lie in"),
+    ("lifelong", "name exactly one of FOLDER and --scene"),
+    ("lifelong no-such", "no-such: no such folder"),
+    ("lifelong .", "holds no sessions"),
+    ("lifelong --scene aren", "Did you mean 'arena'"),
+    ("lifelong --scene arena --slam shuntin", "Did you mean 'shunting'"),
+    ("lifelong --scene arena --slam ,", "--slam must name at least one SLAM"),
+    ("lifelong --scene arena --sessions 1", "--sessions must be 2 to 50, got 1"),
+    ("lifelong --scene arena --sessions 51", "--sessions must be 2 to 50, got 51"),
+    ("lifelong --scene arena --first-seconds 0", "--first-seconds must be > 0 and at most"),
+    ("live", "name exactly one of a scene, --log and --bag"),
+    ("live arena --log x.log", "name exactly one of a scene, --log and --bag"),
+    ("live aren", "Did you mean 'arena'"),
+    ("live arena --slam shuntin", "Did you mean 'shunting'"),
+    ("live arena --port 70000", "--port must lie in 0..65535, got 70000"),
+    ("live arena --speed 1000", "--speed must lie in [0.05, 20], got 1000"),
+    ("export none.mcap --to minari", "--to must be one of tum, carmen, npz, smfeval, got 'minari'"),
+    ("export none.mcap --to tum --slam ekf", "--slam is for --to smfeval, got --to tum"),
+    ("export none.mcap --to smfeval --slam shuntin", "no SLAM is called 'shuntin'"),
+    ("export none.mcap --to carmen --out .", "--out must be a file, got the folder"),
+    ("render absent", "absent: no such file"),
+    ("report no", "no such folder: mobilia compare"),
+    ("sensor-card --scanner full", "a whole model, one of lms221, "),
+    ("sensor-card --scanner utm30lx:noise", "a whole model, one of lms221, "),
+    ("sensor-card --scanner lms221(resolution_deg=0.25)", "a whole model, one of lms221, "),
+    ("sensor-card --scanner scanner", "'scanner' has no data sheet"),
+    ("sensor-card --scanner tim562", "Did you mean 'tim561'"),
+    ("config kiss-icp", "'kiss-icp' has no numbers to set. These have: ekf, "),
+    ("config shuntin", "no numbers to set. Did you mean 'shunting'"),
+    ("config actor{a=1}", "no numbers to set. Did you mean 'actors'"),
+    ("config shunting matchin.local", "Did you mean 'matching.local'"),
+    ("config shunting{rewrad=7}", "Did you mean 'reward'"),
+]
+
+
+@pytest.mark.parametrize(("line", "says"), WRONG)
+def test_wrong_words_are_one_line_that_names_them(tmp_path: Path, monkeypatch, called, line, says):
+    monkeypatch.chdir(tmp_path)
+    verb, *words = re.sub(r"'(.*)'", lambda quoted: quoted[1].replace(" ", "\0"), line).split()
+    out = () if verb in WITHOUT_OUT or "--out" in words else ("--out", tmp_path / "out")
+    done = called(verb, *(word.replace("\0", " ") for word in words), *out)
+    assert done.returncode == (1 if line == "lifelong ." else 2)  # of a folder that is there
+    assert says in done.stderr
+    assert len(done.stderr.splitlines()) == 1
+    assert not re.search(r"\b[A-Z]\w+\.[a-z]", done.stderr)  # no field of ours
+    assert list(tmp_path.iterdir()) == []
