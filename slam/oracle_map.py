@@ -146,13 +146,13 @@ class MapOracle:
         some = points[:: max(1, len(points) // BEAMS)]
         near = np.arange(-NEAR_M, NEAR_M + 1e-9, 0.5 * APART_M)
         around = prior[:2] + np.stack(np.meshgrid(near, near), axis=2).reshape(-1, 2)
-        every = round(APART_M / cell_m)
+        every = max(1, round(APART_M / cell_m))
         rows, columns = np.nonzero(field[::every, ::every] > APART_M)
         cells = cell_m * every * np.stack([columns, rows], axis=1).astype(np.float64)
         everywhere = se2.transform(se2.inverse(T_field_map), cells)
         for places, least in ((around, ENOUGH), (everywhere, len(points) / 2)):
             best, most = None, max(float(ENOUGH), least)
-            for pose in self._likely(places, some):
+            for pose in self._likely(places, some) if len(places) else ():
                 found = self._matched(pose, np.diag(np.square(FOUND)), points)
                 through = self._denied(found[0], points)
                 told = found[2] - AGAINST * through * len(points)
