@@ -232,8 +232,8 @@ class Tracker(abc.ABC):
             left_behind = self._agreement.left_behind(self._dragged)
             self._pose_covariance.dragged(left_behind, self._agreement.covariance(self._dragged))
         if tracked:
-            along_rad = self._pose_covariance.along_rad
-            self._odometry_noise.learn(prediction, match, observations.sensor_sigma_m, along_rad)
+            sigma_m, along_rad = observations.sensor_sigma_m, self._pose_covariance.along_rad
+            self._odometry_noise.learn(prediction, match, sigma_m, along_rad)
         else:
             self._odometry_noise.skip()
 
