@@ -266,8 +266,7 @@ class Tracker(abc.ABC):
     def _report(
         self, frame: Frame, match: Match, state: State, elsewhere: Float | None = None
     ) -> Estimate:
-        self._before = frame.odometry
-        self._T_map_robot = match.T_map_robot
+        self._before, self._T_map_robot = frame.odometry, match.T_map_robot
         T_map_robot = match.T_map_robot if elsewhere is None else elsewhere
         p_lost = 1.0 - (1.0 - self._belief.p_lost) * (1.0 - self._p_off())
         sees = self._belief.status is not Status.BLIND
