@@ -292,7 +292,7 @@ _HARD = (
         sets=_each(motion=1.0, change=0.0, crowd=_crowds("boards", 0, 3, 6, 9, 12), **_QUIET),
     ),
     _ALL[10].later(
-        test=FRESH, sets=tuple({**sets, "n_chairs": 10} for sets in _ALL[10].sets)
+        test=FRESH, counts=True, sets=tuple({**sets, "n_chairs": 10} for sets in _ALL[10].sets)
     ),
     Track(
         name="half-turn-v1", world=2, counts=True, test=FRESH, seconds=120.0,

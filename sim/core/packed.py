@@ -9,6 +9,7 @@ In kernels ``table.name`` is then what it is in Python.
 from __future__ import annotations
 
 import hashlib
+from pathlib import Path
 from typing import Any
 
 # isort: off
@@ -30,6 +31,7 @@ from numba.extending import (
 )
 
 WORD = 8  # bytes
+_LAYOUT = Path(__file__).read_bytes()  # what was compiled for another one must not be found again
 
 
 class TableType(types.Type):  # type: ignore[misc]  # numba has no types
@@ -37,7 +39,7 @@ class TableType(types.Type):  # type: ignore[misc]  # numba has no types
 
     def __init__(self, name: str, fields: dict[str, tuple[Any, int]]) -> None:
         self.fields = fields
-        digest = hashlib.sha256(str(fields).encode()).hexdigest()[:8]
+        digest = hashlib.sha256(str(fields).encode() + _LAYOUT).hexdigest()[:8]
         super().__init__(f"{name}_{digest}")
 
 
@@ -57,6 +59,9 @@ class Packed:
         self._words = np.array(words, dtype=np.int64)
         self._numba_type_ = TableType(type(table).__name__, fields)
         self.address = self._words.ctypes.data
+
+    def __reduce__(self) -> Any:
+        raise TypeError("a packed table cannot be copied: it holds addresses of its arrays")
 
     def _add(self, value: Any, words: list[int]) -> Any:
         """Append the words of a value as Numba lays it out; its type."""

@@ -57,7 +57,7 @@ class Observations:
     points_robot  (n, 2) m
     covariances   (n, 3) m^2: xx, xy, yy; at least (0.8 cell)^2 along every axis
     weights       (n,) share of a full observation
-    tangents      (n, 2) unit direction of the surface where it goes on both ways, else 0
+    tangents      (n, 2) unit direction of the surface where it goes on both ways, or may; else 0
     joined        (n,) bool: the surface goes on to the next point. Without it the dots of a wall
                   seen at a grazing angle match themselves where the robot stood before
     facings       (n,) uint8: the way the surface faces, see ``surfaces.face``; 0: unknown

@@ -111,9 +111,10 @@ def follow_ends(
 ) -> None:
     """Fill the tangents where a surface is no longer seen, but need not end.
 
-    An end is one only where the next beam sees past it. Behind something nearer, beyond the range
-    or the last beam the surface may go on, and its last hit says nothing along it: it moves with
-    the robot. ``sweep``: rad between beams, how many there are, and the range (m) of their use.
+    An end is one only where the next beam sees past it, or has no valid return though it would
+    meet the surface in range. Behind something nearer, beyond the range or the last beam the
+    surface may go on, and its last hit says nothing along it: it moves with the robot.
+    ``sweep``: rad between beams, how many there are, and the range (m) of their use.
     """
     n = len(points)
     for k in range(n):

@@ -95,7 +95,7 @@ def root_share(
     times: float,
     out: NDArray[np.float64],
 ) -> None:
-    """``out`` (2, 2): root of ``times`` the share, at most 1, that ``part`` has of ``whole``.
+    """``out[:2, :2]``: root of ``times`` the share, at most 1, that ``part`` has of ``whole``.
 
     Both are symmetric, ``part`` by xx, xy, yy; the share is taken along the axes of ``whole``.
     """

@@ -36,7 +36,7 @@ class PoseCovariance:
     by_movers_m   deviation of the position by what movers may have carried map and robot off
     unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
                   the noise of their beams would
-    unseen_s      s since all directions were observable; it fades once they are
+    unseen_s      s since all directions were observable, lost ones too; it fades once they are
     along_rad     direction in the map of the one that is not observable, None unless it is one
     """
 
