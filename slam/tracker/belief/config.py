@@ -16,7 +16,7 @@ class BeliefConfig(Settings):
     """Evidence in nats, priors as rates: docs/belief.md."""
 
     confirmed: float = number(
-        4.4, "nats", "a: of long-known surface C that scans confirm from a place, a log(1 + C / c)",
+        5.9, "nats", "a: of long-known surface C that scans confirm from a place, a log(1 + C / c)",
         FITTED,
     )  # fmt: skip
     confirmed_m: float = number(0.94, "m", "c: less than it may be confirmed by chance", FITTED,

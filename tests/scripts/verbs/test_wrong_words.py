@@ -68,7 +68,7 @@ WRONG = [
     ("benchmark --submit a/b", "up to 40 letters"),
     ("benchmark --slam ekf --submit karto", "the name of another SLAM"),
     ("benchmark --merge nothing.json", "nothing.json: no such file"),
-    ("drive arena --slam odometry --seconds -3", "--seconds must lie in (0, 10000]"),
+    ("drive arena --slam odometry --seconds -3", "--seconds must lie in [1e-06, 10000.0]"),
     ("drive arena --slam odometry --seeds 1 1", "--seeds must be"),
     ("drive arena --slam odometry --seeds many", "--seeds must be"),
     ("drive arena --slam odometry --seeds=-1", "--seeds must be"),

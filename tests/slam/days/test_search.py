@@ -97,7 +97,7 @@ def test_a_place_that_is_found_late_is_asked_for_the_scans_before(home):
     while search._late:
         search._ask(pose)
     (again,) = search._places.followed
-    assert again.evidence.known_m == pytest.approx(before, rel=0.15)
+    assert again.evidence.known_m == pytest.approx(before, rel=0.2)
 
 
 CELL = 0.1

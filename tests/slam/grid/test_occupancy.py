@@ -50,7 +50,7 @@ def test_a_look_weighs_less_the_longer_a_cell_was_looked_at(driven):
     shares = []
     for factor in (0.0, 1.0, 10.0):
         system.cell_map.cells.age[:] = factor * ages
-        evidence = look(system.cell_map, 0.0, seen, pose, 0.2, 0)
+        evidence = look(system.cell_map, 0.0, seen, pose, (0.2, 0.0), 0)
         shares.append(evidence.new / evidence.weighed)
     system.cell_map.cells.age[:] = ages
     assert 1.0 >= shares[0] > shares[1] > shares[2] > 0.0

@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("c615b01d5f97", "b2064ccc9edb")),
-        (OccupancyConfig, ["grid"], ("4574f2c24d2b", "e5d8dc7c2924")),
+        (ShuntingConfig, [], ("c77356d2adca", "f8e0ce7c17d3")),
+        (OccupancyConfig, ["grid"], ("3de3eb3b15ea", "5cbe914f3b8a")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
