@@ -6,6 +6,7 @@ from __future__ import annotations
 import signal
 from types import FrameType
 
+LLVM = ("llvmlite.binding", "numba.core.codegen", "slam._linking")  # modules
 _RETRY_S = 0.05  # s, until a signal that came while LLVM was at work is raised
 _asked = False
 
@@ -25,10 +26,10 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
 
 
 def _within_llvm(frame: FrameType | None) -> bool:
-    """Whether LLVM is at work: an exception in one of its callbacks is lost, or what it has half
-    done ends the process with a segmentation fault."""
+    """Whether LLVM is at work, or Numba hands code to it: an exception in a callback is lost, or
+    what is half done ends the process with a segmentation fault."""
     while frame is not None:
-        if str(frame.f_globals.get("__name__")).startswith("llvmlite.binding"):
+        if str(frame.f_globals.get("__name__")).startswith(LLVM):
             return True
         frame = frame.f_back
     return False
