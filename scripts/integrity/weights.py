@@ -90,8 +90,7 @@ class Scans:
 
 def evidence(values: Values, known: Float, through: Float) -> Float:
     """Nats for places, as ``slam.tracker.belief.posterior.Odds.evidence`` (a test holds that)."""
-    chance = values["confirmed_m"]
-    one_view = np.minimum(known, values["linear_m"])
+    chance, one_view = values["confirmed_m"], np.minimum(known, values["linear_m"])
     more = np.log1p(one_view / chance) + (known - one_view) / (chance + one_view)
     beyond = through - values["outdated"] / values["through_per_m"]
     denied = np.where(

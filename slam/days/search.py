@@ -29,12 +29,10 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
-from slam.tracker.belief.config import RelocaliseConfig
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State
-from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
