@@ -46,7 +46,6 @@ def judged(case: Row, drive: Recording) -> Row:
     error_m, lost_s  up to the loss, without the time after the robot was carried elsewhere
     due, told        scans that are off for long enough, and those of them that it admits
     good, false      scans that are not off, and those of them that it does not trust
-    found            of a SLAM that learns the scanner's systematic error: whether it took one off
     """
     every = case.get("every", 1)
     frames = kept(drive.frames, every)
@@ -64,8 +63,6 @@ def judged(case: Row, drive: Recording) -> Row:
         "doubted": ~converged,
     }  # fmt: skip
     row |= {name: int(which.sum()) for name, which in counts.items()}
-    if (learnt := getattr(track.system, "learnt_error", None)) is not None:
-        row["found"] = learnt.found
     return row | {"error_m": error_m, "lost_s": lost_s}
 
 

@@ -24,7 +24,7 @@ from slam.frames import LaserSpec, Scan
 from slam.system import create
 
 NAMES = (
-    "ablation", "accuracy", "habits", "logs", "range_error", "rates",
+    "ablation", "accuracy", "habits", "logs", "rates",
     "scanners", "share_seen", "uncertainty",
 )  # fmt: skip
 STUDIES = {name: importlib.import_module(f"scripts.experiments.{name}").STUDY for name in NAMES}
@@ -95,7 +95,7 @@ def test_a_stream_is_a_scene_or_a_track_at_its_level():
 
 
 def test_each_value_of_a_scanner_is_another_drive():
-    for name in ("accuracy", "range_error", "scanners", "uncertainty"):
+    for name in ("accuracy", "scanners", "uncertainty"):
         one = STUDIES[name]
         cases = one.cases(one._parser().parse_args([]))
         wanted = {case["scanner"] for case in cases}
