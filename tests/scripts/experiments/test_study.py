@@ -24,7 +24,7 @@ from slam.frames import LaserSpec, Scan
 from slam.system import create
 
 NAMES = (
-    "ablation", "accuracy", "habits", "logs", "rates",
+    "ablation", "accuracy", "logs", "rates",
     "scanners", "share_seen", "uncertainty",
 )  # fmt: skip
 STUDIES = {name: importlib.import_module(f"scripts.experiments.{name}").STUDY for name in NAMES}
