@@ -2,7 +2,7 @@
 """Every metric, one row each, in the order of the columns of ``runs.csv``.
 
 ``run`` scores with it, ``compare`` makes its columns and tables from it, ``report`` its pages,
-``reproduce`` and ``scripts.experiments.accuracy`` compute by it: a new metric is a new row.
+``reproduce`` and the experiments compute by it: a new metric is a new row.
 """
 
 from __future__ import annotations

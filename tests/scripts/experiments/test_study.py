@@ -23,10 +23,7 @@ from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import LaserSpec, Scan
 from slam.system import create
 
-NAMES = (
-    "ablation", "accuracy", "logs", "rates",
-    "scanners", "share_seen", "uncertainty",
-)  # fmt: skip
+NAMES = ("ablation", "logs", "rates", "scanners", "share_seen", "uncertainty")
 STUDIES = {name: importlib.import_module(f"scripts.experiments.{name}").STUDY for name in NAMES}
 
 
@@ -95,7 +92,7 @@ def test_a_stream_is_a_scene_or_a_track_at_its_level():
 
 
 def test_each_value_of_a_scanner_is_another_drive():
-    for name in ("accuracy", "scanners", "uncertainty"):
+    for name in ("scanners", "uncertainty"):
         one = STUDIES[name]
         cases = one.cases(one._parser().parse_args([]))
         wanted = {case["scanner"] for case in cases}
