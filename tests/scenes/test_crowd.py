@@ -98,12 +98,6 @@ def test_everybody_has_a_part(pair: tuple[Scene, Scene]):
     }  # fmt: skip
 
 
-def test_the_same_seed_gives_the_same_crowd():
-    scenes = [build("office", seed=5, crowd="escorts:5,streams:3") for _ in range(2)]
-    assert scenes[0].initial == scenes[1].initial
-    assert scenes[0].roles == scenes[1].roles
-
-
 def test_places_of_a_tour_are_apart():
     places = np.array(list(slots(16)))
     gaps = np.linalg.norm(places[:, None] - places[None], axis=2)

@@ -9,28 +9,10 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scripts.comparison.plan import Plan
 from scripts.experiments import share_seen
-from scripts.options import Axis
-from sim.core.dynamism import Dynamism
-from slam.errors import InvalidValueError
 from slam.frames import BeamClass
 
 N, S, SEMI, M = (int(kind) for kind in BeamClass)
-
-
-def test_a_level_sets_both_axes_or_one():
-    at = Axis(name="motion").at(0.5)
-    rates = Dynamism.of(**at)
-    assert (rates.crowd, rates.change) == (0.5, 0.0)
-    rates = Dynamism.of(**Axis(name="change").at(0.5))
-    assert (rates.crowd, rates.change) == (0.0, 0.5)
-    rates = Dynamism.of(**Axis().at(0.5))
-    assert (rates.crowd, rates.change) == (0.5, 0.5)
-    with pytest.raises(InvalidValueError, match="axis must be one of dynamism, motion, change"):
-        Axis(name="speed")
-    with pytest.raises(InvalidValueError, match="axis must be one of"):
-        Plan(slams=("odometry",), scenes=("arena",), levels=(1.0,), seeds=(7,), axis="speed")
 
 
 def test_shares_are_of_the_beams_that_met_something():
