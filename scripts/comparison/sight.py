@@ -80,14 +80,14 @@ def seen_empty(points: Float, drive: Recording) -> NDArray[np.bool_]:
     return empty
 
 
-def clearance(points: Float, drive: Recording, k: int, *, without: int = -1) -> Float:
+def clearance(points: Float, drive: Recording, k: int) -> Float:
     """(n,) m from points (n, 2) to the nearest mover's hull or leaf at scan k; < 0: inside.
 
-    The robot itself and mover ``without`` do not count. Infinite where there is no mover.
+    The robot itself does not count. Infinite where there is no mover.
     """
     nearest = np.full(len(points), math.inf)
     for row, kind in enumerate(drive.kinds):
-        if kind == "robot" or row == without:
+        if kind == "robot":
             continue
         x, y, yaw = drive.poses[k, row].tolist()
         reach = float(drive.radii_m[row])

@@ -114,7 +114,6 @@ class Study:
     apart    an axis with a table for each of its values
     columns  heading -> cell, of the rows of a line
     across, cell  an axis whose values have a column each, and what stands there
-    tell     all that is told of all rows, where that is no such table
     brief    of a row, what goes into the results file
     draw     of all rows, the picture written to a path: ``picture``
     told     one line on how it was made; fields in braces are those of the options
@@ -136,7 +135,6 @@ class Study:
     columns: Mapping[str, Column] = field(default_factory=dict)
     across: str = ""
     cell: Column = losses
-    tell: Column | None = None
     brief: Callable[[Row], Row] = dict
     draw: Callable[[Sequence[Row], Path], None] | None = None
     picture: Path | None = None
@@ -215,8 +213,6 @@ class Study:
 
     def markdown(self, rows: Sequence[Row]) -> str:
         """The tables."""
-        if self.tell is not None:
-            return self.tell(rows)
         if not self.apart:
             return self._table(rows)
         parts = []
