@@ -14,9 +14,7 @@ from collections.abc import Sequence
 from scripts.benchmark.scores import LEAST_DRIFT
 from scripts.benchmark.tracks import TEST, TRACKS, newest
 from scripts.comparison.tables import number
-from scripts.experiments import shared, study
-from scripts.experiments.shared import CM, Row, geometric, losses, on_stream
-from scripts.experiments.study import Study
+from scripts.experiments.study import CM, Row, Study, geometric, judged, losses, on_track
 
 PARTS = (
     "shunting",
@@ -58,12 +56,12 @@ STUDY = Study(
         "level": (0.75, 1.0), "slam": PARTS,
     },
     drive=lambda case: {
-        **on_stream(case["track"], case["level"], case["seed"], case["seconds"]),
+        **on_track(case["track"], case["level"], case["seed"]),
         "every": TRACKS[case["track"]].every,
     },
-    run=shared.judged, lines=("slam",),
+    run=judged, lines=("slam",),
     fits=lambda case: "oracle" not in case["slam"] or case["slam"] == TRACKS[case["track"]].oracle,
-    across="track", cell=both, columns={study.ALL: overall},
+    across="track", cell=both, columns={"all": overall},
     defaults={"seeds": len(TEST), "first_seed": TEST[0]},
 )  # fmt: skip
 
