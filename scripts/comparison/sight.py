@@ -36,10 +36,6 @@ class Sight:
         self.points = _hits(self.scan, self.truth, np.zeros(3) if twist is None else twist)
         self.eye = se2.compose(self.truth, self.scan.spec.T_robot_laser)[:2]
 
-    def emptied(self, points: Float) -> NDArray[np.bool_]:
-        """(n,) which points (n, 2) m a beam passed and went ``BEYOND_M`` farther."""
-        return np.asarray(self.beyond(points) > BEYOND_M)
-
     def beyond(self, points: Float) -> Float:
         """(n,) m by which the nearest beam went farther than points (n, 2) m; -inf without one."""
         spec = self.scan.spec

@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scripts.comparison.maps import MapJudge, disc
-from scripts.comparison.sight import Sight, seen_empty
+from scripts.comparison.sight import BEYOND_M, Sight, seen_empty
 from tests.scripts.comparison.hand_made import HZ, WALL_M, raster, recording
 
 HERE, THERE = (2.0, 0.0), (1.5, 1.5)
@@ -66,8 +66,8 @@ def test_a_drifted_map_is_judged_where_it_lies():
 def test_what_a_scan_saw():
     sight = Sight(recording([HERE]), 0)
     assert np.nanmin(np.hypot(*sight.points.T)) == pytest.approx(1.9, abs=1e-3)
-    empty = sight.emptied(np.array([[1.0, 0.5], [3.0, 0.0], [1.95, 0.0], [-1.0, 0.0], [3.9, 1.0]]))
-    assert empty.tolist() == [True, False, False, False, False]
+    places = np.array([[1.0, 0.5], [3.0, 0.0], [1.95, 0.0], [-1.0, 0.0], [3.9, 1.0]])
+    assert (sight.beyond(places) > BEYOND_M).tolist() == [True, False, False, False, False]
 
 
 def test_the_last_scan_with_a_say_tells_whether_a_place_is_empty():
