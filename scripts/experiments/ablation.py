@@ -12,7 +12,7 @@ import sys
 from collections.abc import Sequence
 
 from scripts.benchmark.scores import LEAST_DRIFT
-from scripts.benchmark.tracks import TEST, TRACKS, newest
+from scripts.benchmark.tracks import TEST, Track, chosen, newest
 from scripts.comparison.tables import number
 from scripts.experiments.study import CM, Row, Study, geometric, judged, losses, on_track
 
@@ -30,6 +30,11 @@ PARTS = (
 )  # fmt: skip
 
 
+def track_of(row: Row) -> Track:
+    """``UnknownNameError`` for none."""
+    return chosen([row["track"]])[0]
+
+
 def drift(rows: Sequence[Row]) -> float:
     """m/m, geometric mean."""
     found = (number(row, "rpe_m_per_m") for row in rows)
@@ -43,8 +48,8 @@ def both(rows: Sequence[Row]) -> str:
 
 def overall(rows: Sequence[Row]) -> str:
     """The last column."""
-    tracks = dict.fromkeys(row["track"] for row in rows)
-    free = [t for t in tracks if not any(sets.get("kidnap_every_s") for sets in TRACKS[t].sets)]
+    tracks = {row["track"]: track_of(row) for row in rows}
+    free = [t for t in tracks if not any(sets.get("kidnap_every_s") for sets in tracks[t].sets)]
     means = [drift([row for row in rows if row["track"] == track]) for track in free]
     return f"{CM * geometric(means):.2f}" if means else "–"
 
@@ -57,10 +62,10 @@ STUDY = Study(
     },
     drive=lambda case: {
         **on_track(case["track"], case["level"], case["seed"]),
-        "every": TRACKS[case["track"]].every,
+        "every": track_of(case).every,
     },
     run=judged, lines=("slam",),
-    fits=lambda case: "oracle" not in case["slam"] or case["slam"] == TRACKS[case["track"]].oracle,
+    fits=lambda case: "oracle" not in case["slam"] or case["slam"] == track_of(case).oracle,
     across="track", cell=both, columns={"all": overall},
     defaults={"seeds": len(TEST), "first_seed": TEST[0]},
 )  # fmt: skip

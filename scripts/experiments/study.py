@@ -181,8 +181,8 @@ class Study:
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
     def _parser(self) -> argparse.ArgumentParser:
-        module = sys.modules[self.run.__module__]
-        parser = argparse.ArgumentParser(prog=self.name, description=module.__doc__)
+        command = sys.modules["__main__"]
+        parser = argparse.ArgumentParser(prog=self.name, description=command.__doc__)
         for axis, values in self.axes.items():
             kind = type(values[0])
             parser.add_argument(f"--{axis}", nargs="+", type=kind, default=list(values))

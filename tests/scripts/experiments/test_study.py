@@ -79,8 +79,9 @@ def test_what_cannot_be_run_is_told_in_a_line(tmp_path: Path, capsys):
     more = ["--folder", str(tmp_path / "a"), "--results", str(tmp_path / "r.json"), "--no-page"]
     assert STUDIES["logs"].main(["--every", "0", *more]) == 1
     assert capsys.readouterr().err.startswith("--every must be a whole number >= 1, got")
-    assert STUDIES["ablation"].main(["--level", "7", *more]) == 1
-    assert capsys.readouterr().err.startswith("the level of a track must be one of")
+    for words, says in (("--level 7", "the level of a track"), ("--track rush-our", "no track")):
+        assert STUDIES["ablation"].main([*words.split(), *more]) == 1
+        assert capsys.readouterr().err.startswith(says)
     assert not list(tmp_path.iterdir())
 
 
