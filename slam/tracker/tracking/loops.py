@@ -119,6 +119,8 @@ class Loops(KeyFrames):
     def map_error(self, frame: int) -> Float | None:
         """(3, 3) by which the map is off here, where ``frame`` is a key frame and loops have just
         been weighed; else None: the error of the frame before has grown by what was driven.
+
+        A corrected map may have moved its first key frame: by that it is off the known start, too.
         """
         if not self._weighed or self.keys[-1].frame != frame:
             return None
@@ -130,7 +132,15 @@ class Loops(KeyFrames):
         }
         held |= {(edge.a, edge.b): edge for edge in self._chain if edge.b > edge.a + 1}
         found = spread(self._numbers.loop_m, self._numbers.loop_rad)
-        return map_errors(self.keys, self._all_poses(), held, self.slack, found)[-1]
+        error = map_errors(self.keys, self._all_poses(), held, self.slack, found)[-1]
+        here = self.keys[-1].T_map_robot
+        off = self._from_start(self.keys[0].T_map_robot, here) - here
+        off[2] = se2.wrap(float(off[2]))
+        return error + np.multiply.outer(off, off)
+
+    def _from_start(self, first: Float, T_map_robot: Float) -> Float:
+        """(3,) a pose of a map that has the first key frame at ``first``, in the known start's."""
+        return se2.compose(self._first, se2.between(first, T_map_robot))
 
     def corrected(self, poses: Float) -> Float:
         """All (n, 3) poses so far, moved with the graph; the same while the map is not torn.
@@ -141,8 +151,7 @@ class Loops(KeyFrames):
         if self.way_m < self._numbers.long_m or not (self._moved or self._torn_keys(1.0)):
             return poses
         after = self._all_poses()
-        T = se2.compose(self._first, se2.inverse(after[0]))
-        return self._carried(np.array([se2.compose(T, pose) for pose in after]), poses)
+        return self._carried(np.array([self._from_start(after[0], one) for one in after]), poses)
 
     def _all_poses(self) -> list[Float]:
         """By the graph; of key frames that it does not have yet, as they followed online."""

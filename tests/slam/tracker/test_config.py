@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("c77356d2adca", "f8e0ce7c17d3")),
-        (OccupancyConfig, ["grid"], ("3de3eb3b15ea", "5cbe914f3b8a")),
+        (ShuntingConfig, [], ("31acae049aca", "77a25007c752")),
+        (OccupancyConfig, ["grid"], ("cbb5e675e345", "4bda0e3a2bfc")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
