@@ -15,12 +15,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Float
 from slam.frontend.odometry_prior import inverted
-from slam.posegraph import Edge, Relaxation, carried, least_moved, relative
+from slam.posegraph import Edge, Relaxation, carried, least_moved
 from slam.tracker.belief.places import coarse, spread
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
@@ -30,7 +29,7 @@ from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.merging import LEFT, MOST_KEYS, Merge
 from slam.tracker.tracking.passages import Passages
-from slam.tracker.tracking.redraw import Correction, Redrawing
+from slam.tracker.tracking.redraw import Correction, Redrawing, torn_pairs
 
 RARE_S = 0.3  # s between frames in the mean, from which on each gets all work; set by hand
 _log = logging.getLogger(__name__)
@@ -89,9 +88,7 @@ class Loops(KeyFrames):
         return [*self._edges.values()]
 
     def work(self) -> None:
-        """Up to ``LoopsConfig.work`` units, a third of it where frames come often; and what the
-        last task takes beyond.
-        """
+        """Up to ``LoopsConfig.work`` units, fewer where frames come often, and the last task's rest."""
         if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
         share = self.keys[-1].start_s / self.keys[-1].frame / RARE_S
@@ -357,16 +354,10 @@ class Loops(KeyFrames):
         near_by = [(k - near, k) for k in range(near, last)
                    if self._passages.way(k - near, k) <= self._numbers.after_m]  # fmt: skip
         pairs = np.array(held + near_by)
-        torn = set(pairs[self._torn(pairs, online, np.array(self.poses)), 1].tolist())
+        torn = set(
+            pairs[torn_pairs(self._numbers, pairs, online, np.array(self.poses)), 1].tolist()
+        )
         return len(torn) if len(torn) >= self._numbers.denying else 0
-
-    def _torn(self, pairs: NDArray[np.int64], online: Float, graph: Float) -> NDArray[np.bool_]:
-        """Whether pairs (n, 2) of key frames lie otherwise in the map than in the graph."""
-        a, b = pairs[:, 0], pairs[:, 1]
-        off = relative(online[a], online[b]) - relative(graph[a], graph[b])
-        far = off[:, 0] ** 2 + off[:, 1] ** 2 > self._numbers.apply_m**2
-        turned = np.abs(se2.wrap_array(off[:, 2])) > self._numbers.apply_rad
-        return np.asarray(far | turned)
 
     def _tie(self, j: int) -> None:
         """Tie a key frame to all passages along there."""
