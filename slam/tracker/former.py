@@ -7,12 +7,14 @@ from collections.abc import Mapping
 from typing import Any
 
 _GROUPS = {
+    "": ("range_error",),
     "tracking": ("quality", "verdict"),
     "frontend": ("surfaces", "view", "prior"),
     "features": ("corners",),
 }
 _NUMBERS: dict[str, tuple[str, ...]] = {
     "frontend": ("spacing_m", "least_weight"),
+    "belief": ("confirmed_share",),
     "standing": (
         "better", "doubtful_m", "explains", "fallen", "fallen_s", "outvoted", "rival_gain",
         "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans", "undecided_s",
@@ -25,7 +27,7 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 
-_LEFT = {"frontend.bias": ("per_m", "per_rad"), "range_error": ("learn",)}  # all others are gone
+_LEFT = {"frontend.bias": ("per_m", "per_rad")}  # all others are gone
 
 
 def updated(words: Any) -> Any:
