@@ -77,7 +77,7 @@ _TRACK_SHOTS: dict[str, dict[str, Any]] = {
     "slow-boards": {"from_s": 20.0, "far_m": 11.0},
     "half-turn": {"from_s": 8.0, "view": "top"},
     "depth-camera": {"from_s": 12.0, "far_m": 13.0},
-    "moving-day": {"from_s": 36.0, "view": "top"},
+    "moving-day": {"from_s": 40.0, "view": "top"},
     "ward-round": {"from_s": 36.0, "view": "top"},
     "overnight": {"from_s": 54.0, "view": "top"},
     "kidnapped-in-a-crowd": {"from_s": 54.0, "view": "top"},
