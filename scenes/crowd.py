@@ -105,7 +105,7 @@ BY_LEVEL = {
     "warehouse": _mixes(escorts=(1, 2, 4, 9), streams=(0, 0, 2, 6), trains=(0, 0, 1, 2)),
 }
 """The crowds of each scene at ``LEVELS``: so many that the share of returns from what moves grows
-about in a line with the motion. Measured by ``scripts.experiments.share_seen`` on seeds below 8."""
+about in a line with the motion (column ``moving_share_of_returns`` of a comparison)."""
 OTHERS_BY_LEVEL = _mixes(escorts=(1, 3, 5, 10))
 """Those of a scene that has no row."""
 

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""World + scanner + encoders + ceiling tags = frames, the same for every listener."""
+"""World + scanner + encoders = frames, the same for every listener."""
 
 from __future__ import annotations
 
@@ -23,7 +23,6 @@ from sim.sensors.lidar.device import LaserScanner, ScanResult
 from sim.sensors.lidar.link import SerialLink, over_link
 from sim.sensors.lidar.registry import ScannerConfig
 from sim.sensors.odometry.encoders import WheelOdometry
-from sim.sensors.tag_cameras import TagCameras, TagReading
 from sim.world.kidnapping import Kidnapping
 from sim.world.labels import BeamLabeller
 from sim.world.script import Script, cues_of, of_file, visitors
@@ -43,7 +42,7 @@ from slam.frames import (
 
 # Of a state, by their words in it.
 _PARTS = {
-    "tags": "ceiling cameras are", "kidnaps": "kidnaps are", "changed": "a moment of change is",
+    "kidnaps": "kidnaps are", "changed": "a moment of change is",
     "events": "events are",
 }  # fmt: skip
 MOST_FRAMES = 1 << 31  # of one simulation: almost two years
@@ -76,8 +75,6 @@ class Simulation:
     start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted; a crowd
                is put around it
     chairs     their physics: "planar" or "free" (``sim.actors.chairs``)
-    tags       "truth", or "camera": beside the truth, ``tag_reading`` is what a ceiling camera
-               would know of the robot by now (``sim.sensors.tag_cameras``)
     labels     whether frames carry truth per beam
     options    passed on to ``scenes.build``: ``scan_height_m`` of the robot's scanner above the
                floor (0.36), and the scene's own, e.g. ``n_chairs=10``
@@ -103,7 +100,6 @@ class Simulation:
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
         chairs: str = "planar",
-        tags: str = "truth",
         labels: bool = False,
         **options: Any,
     ) -> None:
@@ -127,7 +123,6 @@ class Simulation:
         track = self.world.drive_config.track
         self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=track)
         self._labeller = BeamLabeller(self.world) if labels else None
-        self._tags = self._tag_cameras(tags)
         self._stamp_ns = 0
         self._scan: ScanResult | None = None
         self._labels: BeamLabels | None = None
@@ -135,19 +130,6 @@ class Simulation:
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
         self.rearranged: list[Rearrangement] = []  # what changed out of sight just before it
         self._sweep = Sweep(self.laser)
-
-    def _tag_cameras(self, tags: str) -> TagCameras | None:
-        if tags not in ("truth", "camera"):
-            raise InvalidValueError(f"tags must be 'truth' or 'camera', got {tags!r}")
-        if tags == "truth":
-            return None
-        world = self.world
-        return TagCameras(world.model, world.scene.bounds, rng=world.seeds.generator("tags"))
-
-    @property
-    def tag_reading(self) -> TagReading | None:
-        """The newest camera reading of the robot's tag that has arrived; None without cameras."""
-        return None if self._tags is None else self._tags.latest(self.world.time_ns)
 
     @property
     def spec(self) -> LaserSpec:
@@ -204,7 +186,7 @@ class Simulation:
         if self._script is not None:
             self._script.happen(self.world)
         self.rearranged = self._changed_out_of_sight()
-        self._stamp_ns = self._sweep.over_scan(self.world, self.laser, self._tags)
+        self._stamp_ns = self._sweep.over_scan(self.world, self.laser)
         self.contacts = self.world.take_contacts()
         self._sweep.timing.roll(self.encoders, self._sweep.travel, bool(self.contacts))
 
@@ -239,7 +221,7 @@ class Simulation:
         return self._frame
 
     def save_state(self) -> bytes:
-        """World, scanner, encoders, labels, ceiling cameras: all that decides what comes next.
+        """World, scanner, encoders, labels: all that decides what comes next.
 
         Load it into a simulation made with the same arguments, in this or another process; it goes
         on bit for bit. Save between two calls of ``observe``.
@@ -248,7 +230,6 @@ class Simulation:
         world = np.frombuffer(self.world.save_state(), dtype=np.uint8)
         seen = self._labeller.last_seen if self._labeller else np.zeros((0, 3))
         lasers = [state.random_words(rng) for rng in self.laser.streams]
-        seen_by, tags = ({}, None) if self._tags is None else self._tags.save()
         between, scan = self.laser.save()
         if scan:  # the next scan begins within the last step
             between |= {"path": self.path[-2:], "travel": self._sweep.travel[-2:]}
@@ -256,11 +237,11 @@ class Simulation:
         places, kidnaps = ({}, None) if kidnapping is None else kidnapping.save()
         return state.pack(
             {
-                **arrays, **seen_by, **places, "world": world, "seen": seen,
+                **arrays, **places, "world": world, "seen": seen,
                 **{f"scan.{name}": values for name, values in between.items()},
             },
             {
-                "encoders": words, "lasers": lasers, "tags": tags, "scan": scan,
+                "encoders": words, "lasers": lasers, "scan": scan,
                 "scanner": self.laser.scanner.name,
                 **({} if kidnaps is None else {"kidnaps": kidnaps}),
                 **({} if self._change_at_s is None else {"changed": self._changed}),
@@ -286,8 +267,6 @@ class Simulation:
         self.encoders.load(arrays, words["encoders"])
         for rng, saved in zip(self.laser.streams, words["lasers"], strict=True):
             state.restore_random(rng, saved)
-        if self._tags is not None:
-            self._tags.load(arrays, words["tags"])
         if self._labeller is not None and len(arrays["seen"]):
             self._labeller.last_seen[...] = arrays["seen"]
         self.contacts, self.rearranged, self._scan, self._frame = [], [], None, None
@@ -304,7 +283,7 @@ class Simulation:
                 f"the state is of scanner '{words.get('scanner')}', expected '{own_name}'"
             )
         for what, own_part in (
-            ("tags", self._tags), ("kidnaps", self._kidnapping), ("changed", self._change_at_s),
+            ("kidnaps", self._kidnapping), ("changed", self._change_at_s),
             ("events", self._script),
         ):  # fmt: skip
             if (words.get(what) is None) != (own_part is None):

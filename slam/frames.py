@@ -307,7 +307,7 @@ class BeamLabels(ByContent):
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Frame(ByContent):
-    """Everything a robot knows at one moment, and (apart) what only the ceiling tags know.
+    """Everything a robot knows at one moment, and (apart) what only the simulator knows.
 
     stamp_ns  ns; the scan's or the features' stamp, to which odometry and truth are interpolated
     odometry  ``Odometry``

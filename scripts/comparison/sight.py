@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the scans of a recording saw, from the true pose: where they hit, which places they saw
-empty, through which doorways they looked. Where movers stand and stood: new objects that a map
-should hold, old places that it should forget. The same for every SLAM."""
+empty; and where movers stand: new objects that a map should hold. The same for every SLAM."""
 
 from __future__ import annotations
 
@@ -19,7 +18,6 @@ from slam.frames import Float, Scan
 from slam.frontend.deskew import end_points
 
 BEYOND_M = 0.3  # a beam that goes this much farther than a point has seen that nothing is there
-ALONG_M = 0.1  # of a beam beyond its hit that still counts as meeting a doorway
 
 
 class Sight:
@@ -38,10 +36,6 @@ class Sight:
         self.points = _hits(self.scan, self.truth, np.zeros(3) if twist is None else twist)
         self.eye = se2.compose(self.truth, self.scan.spec.T_robot_laser)[:2]
 
-    def emptied(self, points: Float) -> NDArray[np.bool_]:
-        """(n,) which points (n, 2) m a beam passed and went ``BEYOND_M`` farther."""
-        return np.asarray(self.beyond(points) > BEYOND_M)
-
     def beyond(self, points: Float) -> Float:
         """(n,) m by which the nearest beam went farther than points (n, 2) m; -inf without one."""
         spec = self.scan.spec
@@ -54,19 +48,6 @@ class Sight:
         measured = self.scan.ranges[np.clip(nearest, 0, spec.n_beams - 1)].astype(np.float64)
         told = inside & np.isfinite(measured)
         return np.where(told, np.where(told, measured, 0.0) - ranges, -math.inf)
-
-    def crossing(self, start: Float, end: Float) -> int:
-        """How many beams cross or end at the line from ``start`` to ``end`` (2,) m."""
-        rays = self.points - self.eye
-        length = np.sqrt((rays * rays).sum(axis=1))
-        with np.errstate(invalid="ignore", divide="ignore"):
-            rays = rays * (1.0 + ALONG_M / length)[:, None]
-            line, offset = end - start, start - self.eye
-            across = rays[:, 0] * line[1] - rays[:, 1] * line[0]
-            at_ray = (offset[0] * line[1] - offset[1] * line[0]) / across
-            at_line = (offset[0] * rays[:, 1] - offset[1] * rays[:, 0]) / across
-            crossed = (at_ray > 0.0) & (at_ray < 1.0) & (at_line > 0.0) & (at_line < 1.0)
-        return int(crossed.sum())
 
 
 def _hits(scan: Scan, truth: Float, twist: Float) -> Float:
@@ -95,14 +76,14 @@ def seen_empty(points: Float, drive: Recording) -> NDArray[np.bool_]:
     return empty
 
 
-def clearance(points: Float, drive: Recording, k: int, *, without: int = -1) -> Float:
+def clearance(points: Float, drive: Recording, k: int) -> Float:
     """(n,) m from points (n, 2) to the nearest mover's hull or leaf at scan k; < 0: inside.
 
-    The robot itself and mover ``without`` do not count. Infinite where there is no mover.
+    The robot itself does not count. Infinite where there is no mover.
     """
     nearest = np.full(len(points), math.inf)
     for row, kind in enumerate(drive.kinds):
-        if kind == "robot" or row == without:
+        if kind == "robot":
             continue
         x, y, yaw = drive.poses[k, row].tolist()
         reach = float(drive.radii_m[row])
@@ -120,7 +101,6 @@ MOVED_M = 0.15  # shift of the centre plus turn at the rim that makes it another
 STILL_S, SEEN_SCANS, LATELY_S = 2.0, 5, 2.0
 APART_M = 0.2  # points nearer to a wall than this tell nothing about a mover
 GRAIN_M = 0.02  # hits nearer to one another are one point
-BELIEVED = 0.5
 
 
 def _group(kind: str) -> str:
@@ -144,58 +124,21 @@ class Place:
         return (np.array(sorted(self.cells), dtype=np.float64).reshape(-1, 2) + 0.5) * GRAIN_M
 
 
-@dataclass(eq=False)
-class OldPlace:
-    """A place that its mover has left, and for how long a map's belief in it lasts.
-
-    believed      by the latest map, None before the first
-    seen_empty_s  when it was first seen empty, and ``observations`` in how many scans since
-    lasted_s      from then to the latest map asked
-    forgotten     that map no longer believed it: its end was seen
-    over          no longer watched: something stands there again, or it was not believed at first
-    """
-
-    points: Float
-    believed: bool | None = None
-    seen_empty_s: float | None = None
-    observations: int = 0
-    lasted_s: float = 0.0
-    forgotten: bool = False
-    over: bool = False
-
-    @property
-    def watched(self) -> bool:
-        """Whether maps still matter."""
-        return not self.over and not self.forgotten
-
-    @property
-    def fading(self) -> bool:
-        """Whether every map matters: it has been seen empty and is still believed."""
-        return self.watched and self.seen_empty_s is not None
-
-
 class Places:
     """The places of all movers of a recording, scan by scan."""
 
-    def __init__(
-        self,
-        drive: Recording,
-        near_static: Callable[[Float], Float],
-        believes: Callable[[Float], bool | None],
-    ) -> None:
-        """A tally over one drive.
+    def __init__(self, drive: Recording, near_static: Callable[[Float], Float]) -> None:
+        """Over one drive.
 
         near_static  m from points (n, 2) in the world to the nearest thing that never moves
-        believes     whether the latest map holds such points; None before the first map
         """
-        self._drive, self._near_static, self._believes = drive, near_static, believes
+        self._drive, self._near_static = drive, near_static
         self._rows = [
             k for k, kind in enumerate(drive.kinds) if _group(kind) not in ("door", "robot")
         ]
         self.standing = {row: Place(drive.poses[0, row], 0, new=False) for row in self._rows}
-        self.left: list[OldPlace] = []
 
-    def look(self, k: int, sight: Sight, seconds: float) -> None:
+    def look(self, k: int, sight: Sight) -> None:
         """Take in scan k."""
         drive = self._drive
         for row in self._rows:
@@ -203,7 +146,6 @@ class Places:
             turned = abs(se2.wrap(float(pose[2] - place.pose[2]))) * float(drive.radii_m[row])
             shift = math.dist(pose[:2].tolist(), place.pose[:2].tolist())
             if shift + turned > MOVED_M:
-                self._leave(row, place)
                 place = self.standing[row] = Place(pose, k, new=True)
             hits = sight.points[drive.hit[k] == row]
             hits = hits[np.isfinite(hits[:, 0])]
@@ -211,31 +153,6 @@ class Places:
             if len(hits):
                 place.cells.update(map(tuple, np.floor(hits / GRAIN_M).astype(int).tolist()))
                 place.scans, place.last = place.scans + 1, k
-        for old in self.left:
-            if old.watched:
-                self._watch(old, k, sight, seconds)
-
-    def _leave(self, row: int, place: Place) -> None:
-        """People leave no place: they never stood there for good."""
-        if place.scans >= SEEN_SCANS and _group(self._drive.kinds[row]) != "person":
-            points = place.points()
-            self.left.append(OldPlace(points, believed=self._believes(points)))
-
-    def _watch(self, old: OldPlace, k: int, sight: Sight, seconds: float) -> None:
-        empty = sight.emptied(old.points).mean() >= 0.5
-        if old.believed is None or (old.seen_empty_s is None and not empty):
-            return
-        if (clearance(old.points, self._drive, k) < 0.5 * APART_M).any():
-            old.over = old.seen_empty_s is not None  # not gone yet, or taken again
-            return
-        if not empty:
-            return
-        if old.seen_empty_s is None:
-            if not old.believed:
-                old.over = True  # never was in the map: nothing to forget
-                return
-            old.seen_empty_s = seconds
-        old.observations += 1
 
     def new_objects(self, k: int, scans_per_s: float) -> Iterator[Float]:
         """Points of everything that stands at a new place long enough and was seen lately."""

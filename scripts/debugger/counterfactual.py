@@ -26,7 +26,6 @@ CURED = 0.5
 LAST_S = 1.0
 REPEATED = 3  # of the cures by several at once
 PAIRED = 4  # the likeliest of which pairs are tried
-VERDICTS = ("none", "weak", "undecided", "culprit", "several", "joint", "not the movers")
 
 Note = Callable[[str, int, int], None]
 

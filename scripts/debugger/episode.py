@@ -20,7 +20,7 @@ from slam.frames import Float
 from slam.trajectory import read_tum
 
 NO_OPTIONS = (
-    "scene", "seed", "dynamism", "motion", "change", "crowd", "laser", "labels", "tags",
+    "scene", "seed", "dynamism", "motion", "change", "crowd", "laser", "labels",
 )  # fmt: skip
 
 

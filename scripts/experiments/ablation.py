@@ -12,11 +12,9 @@ import sys
 from collections.abc import Sequence
 
 from scripts.benchmark.scores import LEAST_DRIFT
-from scripts.benchmark.tracks import TEST, TRACKS, newest
+from scripts.benchmark.tracks import TEST, Track, chosen, newest
 from scripts.comparison.tables import number
-from scripts.experiments import shared, study
-from scripts.experiments.shared import CM, Row, geometric, losses, on_stream
-from scripts.experiments.study import Study
+from scripts.experiments.study import CM, Row, Study, geometric, judged, losses, on_track
 
 PARTS = (
     "shunting",
@@ -32,6 +30,11 @@ PARTS = (
 )  # fmt: skip
 
 
+def track_of(row: Row) -> Track:
+    """``UnknownNameError`` for none."""
+    return chosen([row["track"]])[0]
+
+
 def drift(rows: Sequence[Row]) -> float:
     """m/m, geometric mean."""
     found = (number(row, "rpe_m_per_m") for row in rows)
@@ -45,8 +48,8 @@ def both(rows: Sequence[Row]) -> str:
 
 def overall(rows: Sequence[Row]) -> str:
     """The last column."""
-    tracks = dict.fromkeys(row["track"] for row in rows)
-    free = [t for t in tracks if not any(sets.get("kidnap_every_s") for sets in TRACKS[t].sets)]
+    tracks = {row["track"]: track_of(row) for row in rows}
+    free = [t for t in tracks if not any(sets.get("kidnap_every_s") for sets in tracks[t].sets)]
     means = [drift([row for row in rows if row["track"] == track]) for track in free]
     return f"{CM * geometric(means):.2f}" if means else "–"
 
@@ -58,12 +61,12 @@ STUDY = Study(
         "level": (0.75, 1.0), "slam": PARTS,
     },
     drive=lambda case: {
-        **on_stream(case["track"], case["level"], case["seed"], case["seconds"]),
-        "every": TRACKS[case["track"]].every,
+        **on_track(case["track"], case["level"], case["seed"]),
+        "every": track_of(case).every,
     },
-    run=shared.judged, lines=("slam",),
-    fits=lambda case: "oracle" not in case["slam"] or case["slam"] == TRACKS[case["track"]].oracle,
-    across="track", cell=both, columns={study.ALL: overall},
+    run=judged, lines=("slam",),
+    fits=lambda case: "oracle" not in case["slam"] or case["slam"] == track_of(case).oracle,
+    across="track", cell=both, columns={"all": overall},
     defaults={"seeds": len(TEST), "first_seed": TEST[0]},
 )  # fmt: skip
 

@@ -18,8 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from scripts.comparison.entry import scored
-from scripts.experiments.shared import CM, Row, of
-from scripts.experiments.study import Study
+from scripts.experiments.study import CM, Row, Study, of
 from scripts.metrics.judged import Judged, world_truth
 from slam.evaluation import metrics
 from slam.evaluation.consistency import KeptScans

@@ -12,6 +12,7 @@ import argparse
 import hashlib
 import importlib
 import json
+import math
 import shlex
 import sys
 from collections.abc import Callable, Mapping, Sequence
@@ -21,21 +22,33 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 import scenes
 import sim
 import slam
-from scripts.comparison.recording import load, record
+from scripts.benchmark.tracks import chosen
+from scripts.comparison.entry import scored
+from scripts.comparison.recording import Recording, load, record
+from scripts.comparison.tables import number
 from scripts.console import ended
-from scripts.experiments.shared import Column, Row, losses
 from scripts.imports import scripts_of, sources
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine, versions
 from scripts.marks import fill_page, filled, table
+from scripts.metrics.judged import world_truth
+from scripts.metrics.table import METRICS
 from scripts.names import file_name
 from scripts.result_files import RESULTS, SCHEMA, commit, write
 from sim.core.versions import WORLD
 from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError
+from slam.replay import Track
+from slam.system import create
+
+CM = 100.0
+Row = dict[str, Any]
+Column = Callable[[Sequence[Row]], str]
 
 
 def add_options(parser: argparse.ArgumentParser, out: str, page: Path) -> None:
@@ -92,8 +105,45 @@ def head(
     }
 
 
+def judged(case: Row, drive: Recording) -> Row:
+    """The run of ``case["slam"]``: each column of a comparison."""
+    track, truth = Track(case["slam"], create(case["slam"])), world_truth(drive.frames)
+    failure = track.survive(drive.frames)
+    return scored(track, None if failure else track.final(), failure, truth)
+
+
+def on_track(name: str, level: float, seed: int) -> Row:
+    """Every scan of a level of a track; ``UnknownNameError`` for none, ``InvalidValueError`` for a
+    level that it has not."""
+    plan = chosen([name])[0].plan((), (seed,), levels=(level,))
+    return asdict(plan.recipe(plan.runs()[0]))
+
+
+def of(
+    key: str, how: Callable[[Any], Any] = np.median, scale: float = 1.0, form: str = "{:.2f}"
+) -> Column:
+    """A column: ``how`` of that number over the rows that have it; of a failed run's error inf."""
+
+    def tell(rows: Sequence[Row]) -> str:
+        of_metric = key in METRICS and "outcome" in rows[0]
+        found = (number(row, key) if of_metric else row.get(key) for row in rows)
+        values = np.array([v for v in found if v is not None and not math.isnan(v)])
+        return form.format(scale * float(how(values))) if len(values) else "–"
+
+    return tell
+
+
+def losses(rows: Sequence[Row]) -> str:
+    """A column: runs lost, of how many."""
+    return f"{sum(row['lost'] for row in rows)} of {len(rows)}"
+
+
+def geometric(values: Sequence[float]) -> float:
+    """Mean."""
+    return math.exp(float(np.log(values).mean()))
+
+
 RECORDINGS, ROWS = "recordings", "rows"  # folders of the jobs' files
-ALL = "all"  # in the place of an axis over which a line of the table is pooled
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -109,17 +159,10 @@ class Study:
     data     of a case: files that ``run`` reads; with another content it is made again
     fits     whether a case is run at all
     lines    axes of which each combination is a line of the table; the rest is pooled
-    hidden   of them, those that the columns tell of
-    pooled   of them, those that have lines over all of their values, too
-    apart    an axis with a table for each of its values
     columns  heading -> cell, of the rows of a line
     across, cell  an axis whose values have a column each, and what stands there
-    tell     all that is told of all rows, where that is no such table
-    brief    of a row, what goes into the results file
-    draw     of all rows, the picture written to a path: ``picture``
     told     one line on how it was made; fields in braces are those of the options
     page     that holds what is told; None: it is printed
-    results  whether the rows go to ``docs/results``; else into the folder
     defaults  of the options, where they are others than usual
     """
 
@@ -130,49 +173,35 @@ class Study:
     data: Callable[[Row], Sequence[Path]] = lambda case: ()
     fits: Callable[[Row], bool] = lambda case: True
     lines: Sequence[str] = ()
-    hidden: Sequence[str] = ()
-    pooled: Sequence[str] = ()
-    apart: str = ""
     columns: Mapping[str, Column] = field(default_factory=dict)
     across: str = ""
     cell: Column = losses
-    tell: Column | None = None
-    brief: Callable[[Row], Row] = dict
-    draw: Callable[[Sequence[Row], Path], None] | None = None
-    picture: Path | None = None
     told: str = "World {world}, {seeds} seeds from {first_seed}, {seconds:g} s."
     page: Path | None = None
-    results: bool = False
     defaults: Mapping[str, Any] = field(default_factory=dict)
 
     def _parser(self) -> argparse.ArgumentParser:
-        module = sys.modules[self.run.__module__]
-        parser = argparse.ArgumentParser(prog=self.name, description=module.__doc__)
+        command = sys.modules["__main__"]
+        parser = argparse.ArgumentParser(prog=self.name, description=command.__doc__)
         for axis, values in self.axes.items():
             kind = type(values[0])
             parser.add_argument(f"--{axis}", nargs="+", type=kind, default=list(values))
         own = Path("out") / self.name
         parser.add_argument("--folder", type=Path, default=own, help="of recordings and rows")
-        if self.picture:
-            parser.add_argument("--picture", type=Path, default=self.picture)
         add_options(parser, f"{self.name}.json", self.page or Path())
-        if not self.results:
-            parser.set_defaults(results=own / f"{self.name}.json")
-        parser.set_defaults(**self.defaults)
+        parser.set_defaults(results=own / f"{self.name}.json", **self.defaults)
         return parser
 
     @ended
     def main(self, arguments: Sequence[str] | None = None) -> None:
-        """The command: make what is missing, print the table, write results, picture and page."""
+        """The command: make what is missing, print the table, write results and page."""
         wanted = self._parser().parse_args(arguments)
         wanted.no_page = wanted.no_page or self.page is None
         first = head(wanted, self.name, arguments, *self.axes)
         rows = self.rows(self.cases(wanted), wanted.folder, wanted.jobs)
         told = self.told.format(world=WORLD, **vars(wanted))
         text = f"{told}\n\n{self.markdown(rows)}"
-        write(wanted.results, first, {"runs": {self._key(row): self.brief(row) for row in rows}})
-        if self.draw:
-            self.draw(rows, wanted.picture)
+        write(wanted.results, first, {"runs": {self._key(row): row for row in rows}})
         if not wanted.no_page:
             fill_page(wanted.page, self.name, text)
         print(text)
@@ -214,33 +243,19 @@ class Study:
         return " ".join(str(row[key]) for key in (*self.axes, "seed"))
 
     def markdown(self, rows: Sequence[Row]) -> str:
-        """The tables."""
-        if self.tell is not None:
-            return self.tell(rows)
-        if not self.apart:
-            return self._table(rows)
-        parts = []
-        for value in dict.fromkeys(row[self.apart] for row in rows):
-            parts += [f"`{value}`:", self._table([r for r in rows if r[self.apart] == value])]
-        return "\n\n".join(parts)
-
-    def _table(self, rows: Sequence[Row]) -> str:
-        shown = [axis for axis in self.lines if axis not in self.hidden]
+        """The table."""
         wide = dict.fromkeys(row[self.across] for row in rows) if self.across else {}
         groups: dict[tuple[Any, ...], list[Row]] = {}
-        for free in product((False, True), repeat=len(self.pooled)):
-            alike = {axis: ALL for axis, over in zip(self.pooled, free, strict=True) if over}
-            for row in rows:
-                told = {**row, **alike}
-                groups.setdefault(tuple(told[axis] for axis in self.lines), []).append(told)
+        for row in rows:
+            groups.setdefault(tuple(row[axis] for axis in self.lines), []).append(row)
         lines = []
-        for own in groups.values():
-            cells = [_word(own[0][axis]) for axis in shown]
+        for values, own in groups.items():
+            cells = [_word(value) for value in values]
             for value in wide:
                 of_it = [row for row in own if row[self.across] == value]
                 cells.append(self.cell(of_it) if of_it else "–")
             lines.append([*cells, *(tell(own) for tell in self.columns.values())])
-        return table((*shown, *(_word(value) for value in wide), *self.columns), lines)
+        return table((*self.lines, *(_word(value) for value in wide), *self.columns), lines)
 
 
 def _word(value: Any) -> str:

@@ -11,8 +11,7 @@ from typing import Any
 
 from scripts.benchmark.tracks import chosen
 from scripts.comparison.recording import load
-from scripts.experiments.shared import on_stream
-from scripts.experiments.study import recorded
+from scripts.experiments.study import on_track, recorded
 from scripts.integrity.campaign import PLANE
 from scripts.integrity.labelled import Labelled, labelled
 from scripts.integrity.plane import KINDS, StreamSpec, frames
@@ -49,7 +48,7 @@ class Stream:
     def simulated(self) -> Job:
         """The job that records it."""
         every = chosen([self.track])[0].every
-        return recorded({"every": every, **on_stream(self.track, self.level, self.seed, 0.0)})
+        return recorded({"every": every, **on_track(self.track, self.level, self.seed)})
 
 
 Source = Stream | StreamSpec | Path

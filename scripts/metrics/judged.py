@@ -21,7 +21,6 @@ from slam.trajectory import Trajectory
 
 SILENT_M = 0.1  # m; a larger error that the SLAM does not admit is a silent failure
 SILENT_SIGMAS = 3.0  # of its own covariance; an error within them is admitted
-DUE_S = 2.0  # s of such an error, after which the SLAM has to admit it
 SETTLED_S = 5.0  # NEES counts after this: before, the covariance is that of the known first pose
 
 
@@ -152,15 +151,6 @@ class Judged:
         determinants = P[:, 0, 0] * P[:, 1, 1] - P[:, 0, 1] ** 2
         beyond = scaled >= SILENT_SIGMAS**2 * determinants
         return np.asarray(~(self.converged() & beyond))
-
-    def is_due(self) -> NDArray[np.bool_]:
-        """(n,) scans off by more than ``SILENT_M`` without a break for ``DUE_S`` or longer."""
-        seconds = (self.pairs.stamps_ns - self.pairs.stamps_ns[0]) / NS_PER_S
-        out, since = np.zeros(len(seconds), dtype=np.bool_), math.inf
-        for k, off in enumerate(self.is_off().tolist()):
-            since = min(since, float(seconds[k])) if off else math.inf
-            out[k] = off and seconds[k] - since >= DUE_S
-        return out
 
     def nees_over_3(self) -> float | None:
         """Mean after ``SETTLED_S``; None where the SLAM claims nothing, as guests."""

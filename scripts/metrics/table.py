@@ -2,7 +2,7 @@
 """Every metric, one row each, in the order of the columns of ``runs.csv``.
 
 ``run`` scores with it, ``compare`` makes its columns and tables from it, ``report`` its pages,
-``reproduce`` and ``scripts.experiments.accuracy`` compute by it: a new metric is a new row.
+``reproduce`` and the experiments compute by it: a new metric is a new row.
 """
 
 from __future__ import annotations
@@ -152,25 +152,10 @@ _ALL = (
            name="memory", shown="MB", log=True,
            about="growth of resident memory at its highest"),
     _share("ghost_rate", "ghosts", "share of occupied cells with nothing within 15 cm", "less"),
-    _share("ghost_left_rate", "ghosts left behind",
-           "share of occupied cells where a mover was seen before and nothing is now", "less"),
     _share("new_object_recall", "new objects found",
            "of what stands at a new place for 2 s and was seen in 5 scans, the share that "
            "the map holds", "more"),
     _count("new_objects", "maps"),
-    Metric(key="half_life_s", unit="s", better="less", label="half-life", section="maps",
-           name="half-life of a moved chair", shown="s",
-           about="Kaplan-Meier median over what was moved: how long the map shows it at its old "
-           "place after the scan that first sees that empty; ∞ where most outlast the watch"),
-    Metric(key="half_life_observations", unit="scans", better="less", label="half-life",
-           section="maps", name="half-life of a moved chair", shown="looks",
-           about="the same, in scans that looked there"),
-    _count("half_life_events", "maps"),
-    _count("half_life_censored", "maps"),
-    _share("door_accuracy", "doors right",
-           "of doors seen in the last 2 s and closed or open, the share that the map shows so",
-           "more"),
-    _count("doors_judged", "maps"),
     _count("duration_s", "drive", "s"),
     Metric(key="distance_m", unit="m", label="distance driven", section="drive"),
     Metric(key="moving_share_of_returns", unit="", label="returns from what moves",

@@ -33,7 +33,7 @@ from scripts.output import whole_folder, write_recipe
 from scripts.pages import page as pages
 from scripts.pages.page import Page, Part, command
 from scripts.single_run import score
-from scripts.single_run.score import Drawn, drawn, for_file
+from scripts.single_run.maps import Drawn, drawn, for_file
 from sim.view.draw import Picture
 from slam.errors import InvalidValueError
 from slam.evaluation.consistency import KeptScans

@@ -6,9 +6,8 @@ Two axes, both at ``d`` when one number ``dynamism`` is given:
 **motion**  what moves now. ``CURVES`` below are the rates of shoves, doors and trips, as they were
             in world 1; ``crowd`` brings people, boards and trains into the room besides, at 1 the
             whole crowd of the scene (``scenes.crowd.BY_LEVEL``). Each scene has its own numbers at
-            four levels, so that the share of returns from what moves grows about in a line with it
-            (``scripts.experiments.share_seen``). People hide one another, so their number grows
-            faster than that.
+            four levels, so that the share of returns from what moves grows about in a line with
+            it. People hide one another, so their number grows faster than that.
 **change**  of what can move, the share that stands elsewhere than when the robot last saw it
             (``sim.actors.rearranging``).
 

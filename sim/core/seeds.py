@@ -25,7 +25,7 @@ STREAMS = (
     "odometry",
     "driving",
     "bins",
-    "tags",
+    "tags",  # of ceiling cameras, which are gone
     "loads",
     "change",
     "goals",

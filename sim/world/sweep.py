@@ -13,7 +13,6 @@ from sim.core.packed import packed
 from sim.sensors.lidar.device import STEPS_PER_S, LaserScanner
 from sim.sensors.lidar.schedule import Window
 from sim.sensors.odometry.encoders import WheelOdometry
-from sim.sensors.tag_cameras import TagCameras
 from sim.world.substeps import Watch
 from sim.world.world import SUBSTEPS_PER_S, World
 from slam import se2
@@ -86,7 +85,7 @@ class Sweep:
         """The next scan is of another scanner, or of a state that was loaded."""
         self._window = None
 
-    def over_scan(self, world: World, laser: LaserScanner, tags: TagCameras | None) -> int:
+    def over_scan(self, world: World, laser: LaserScanner) -> int:
         """Let the time of one scan pass; the stamp of its earliest beam, ns."""
         noted = laser.begin(world.data)
         window = laser.window
@@ -103,14 +102,5 @@ class Sweep:
         start_ns, phase = world.time_ns, laser.phase
         if phase:
             start_ns = round((world.step_count - phase) * Fraction(NS_PER_S, SUBSTEPS_PER_S))
-        self._steps(world, window, tags)
+        world.advance(window.before, window.last, self._watch)
         return start_ns + self.timing.offset_ns
-
-    def _steps(self, world: World, window: Window, tags: TagCameras | None) -> None:
-        first = window.before
-        # With ceiling cameras the world stops after every step for them to look.
-        for stop in range(first + 1, window.last + 1) if tags else (window.last,):
-            world.advance(first, stop, self._watch)
-            if tags is not None:
-                tags.note(world.time_ns, world.data)
-            first = stop

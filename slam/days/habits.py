@@ -25,11 +25,12 @@ from itertools import product
 import numpy as np
 
 from slam.days.history import History, dense, hour_of
-from slam.days.predictions import HOUR_S, LEAST, Sightings, log_score
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frames import Float
 
+HOUR_S = 3600.0
+LEAST = 0.01  # no probability is nearer to 0 or 1; set by hand
 BINS = 8  # of the hours of a day; set by hand
 PRIOR = 2.0  # looks, that a place's share is drawn to the building's by; set by hand
 _ROUNDS = 20  # of expectation maximisation
@@ -73,30 +74,63 @@ def near_hours(hours: Float, hour: float, width: float) -> Float:
     return np.asarray(np.maximum(1.0 - off / width, 0.0))
 
 
-class Habits(Sightings):
-    """Two-state chains with hours, a tempo for each place."""
+def log_score(probabilities: Float, taken: Float) -> Float:
+    """-log of the probability of what came, nats, none nearer to 0 or 1 than ``LEAST``."""
+    p = np.clip(probabilities, LEAST, 1.0 - LEAST)
+    return np.asarray(-np.log(np.where(taken > 0.5, p, 1.0 - p)))
+
+
+class Habits:
+    """Two-state chains with hours, a tempo for each of n places.
+
+    A sighting is 1 taken, 0 empty, between for what stood there part of the session, NaN for not
+    seen.
+    """
 
     def __init__(self, n: int) -> None:
-        super().__init__(n)
+        if n < 0:
+            raise InvalidValueError(f"n must be >= 0 places, got {n}")
+        self.n = n
+        self.times_s: list[float] = []
+        self.rows: list[Float] = []
         self.last = np.full(n, np.nan)
         self.last_s = np.full(n, np.nan)
         self.scores = np.zeros((len(TEMPOS), n))  # log likelihood of the sightings so far
         self._before: dict[float, tuple[Float, ...]] = {}
 
     def see(self, time_s: float, values: Float) -> None:
-        """Score every tempo by it, then take it in."""
-        values = self.checked(time_s, values)
+        """Score every tempo by the (n,) sightings of a session, then take them in.
+
+        Raises ``InvalidValueError`` for a session out of order or out of [0, 1].
+        """
+        values = self._checked(time_s, values)
         if self.times_s:
             told = self._by_tempo(time_s)
             known = ~np.isnan(values)
             lost = values * log_score(told, np.ones(self.n))
             lost = lost + (1.0 - values) * log_score(told, np.zeros(self.n))
             self.scores[:, known] -= lost[:, known]
-        super().see(time_s, values)
+        self.rows.append(values)
+        self.times_s.append(float(time_s))
         known = ~np.isnan(values)
         self.last = np.where(known, values, self.last)
         self.last_s = np.where(known, time_s, self.last_s)
         self._before.clear()
+
+    def _checked(self, time_s: float, values: Float) -> Float:
+        values = np.asarray(values, dtype=np.float64)
+        if values.shape != (self.n,):
+            raise InvalidValueError(f"values must be ({self.n},), got {values.shape}")
+        known = values[~np.isnan(values)]
+        if known.size and not 0.0 <= known.min() <= known.max() <= 1.0:
+            raise InvalidValueError("values must lie in [0, 1] or be NaN")
+        if not math.isfinite(time_s) or (self.times_s and time_s <= self.times_s[-1]):
+            raise InvalidValueError(f"time_s must come after {self.times_s[-1:]}, got {time_s}")
+        return values
+
+    def _table(self) -> Float:
+        """(sessions, n)."""
+        return np.array(self.rows).reshape(len(self.rows), self.n)
 
     def weights(self) -> Float:
         """(tempos, n) of each tempo at each place; they add up to 1."""
@@ -148,7 +182,7 @@ class Habits(Sightings):
 
     def _overall(self) -> Float:
         """Share of each place, drawn to that of all."""
-        table = self.table()
+        table = self._table()
         known = ~np.isnan(table)
         everywhere = (np.nansum(table) + 1.0) / (known.sum() + 2.0)
         return np.asarray(
@@ -159,7 +193,7 @@ class Habits(Sightings):
         """Overall share, that moved by the hour, and sightings about that hour: sum and number."""
         key = round(hour, 6)
         if key not in self._before:
-            table = self.table()
+            table = self._table()
             overall = self._overall()
             near = near_hours(hour_of(np.array(self.times_s)), hour, 24.0 / BINS)
             known = ~np.isnan(table)

@@ -88,28 +88,6 @@ def central_interval(resampled: Sequence[float]) -> tuple[float, float]:
     return quantile(resampled, tail), quantile(resampled, 1.0 - tail)
 
 
-def censored_median(lasted: Sequence[float], ended: Sequence[bool]) -> float | None:
-    """Kaplan-Meier median of durations, of which some were watched for so long without an end.
-
-    The least duration at which the estimated share that lasts longer, the product over all ends up
-    to then of 1 - ends / (those watched for so long), is at most one half. Infinite where the share
-    stays above; None of nothing. Raises ``InvalidValueError`` for what is no duration, or no pairs.
-    """
-    if len(lasted) != len(ended):
-        raise InvalidValueError(f"{len(lasted)} durations must have as many ends, got {len(ended)}")
-    if not lasted:
-        return None
-    for duration in lasted:
-        if not math.isfinite(duration):
-            raise InvalidValueError(f"durations must be finite, got {duration}")
-    watched = scipy.stats.CensoredData.right_censored(
-        np.asarray(lasted, float), ~np.asarray(ended, bool)
-    )
-    longer = scipy.stats.ecdf(watched).sf
-    below = longer.quantiles[longer.probabilities <= 0.5 + 1e-9]  # products of fractions
-    return float(below[0]) if len(below) else math.inf
-
-
 def share_interval(hits: int, n: int) -> tuple[float, float]:
     """Wilson's 95 % interval of a share."""
     if n == 0:

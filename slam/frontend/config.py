@@ -5,7 +5,7 @@ from __future__ import annotations
 
 from dataclasses import dataclass, field
 
-from slam.settings import Settings, number, word
+from slam.settings import Settings, number
 
 UMBMARK = "Borenstein and Feng 1996 (UMBmark)"
 
@@ -16,15 +16,6 @@ class BiasConfig(Settings):
 
     per_m: float = number(0.012, "rad/m", "heading bias among robots, 1 σ, by distance", UMBMARK)
     per_rad: float = number(0.03, "rad/rad", "heading bias among robots, 1 σ, by turn", UMBMARK)
-
-
-@dataclass(frozen=True, kw_only=True)
-class RangeErrorConfig(Settings):
-    """A smooth function of range and one of incidence, learnt from surfaces seen twice."""
-
-    learn: str = word(
-        "off", ("off", "on"), "learn the scanner's systematic error and take it off the ranges"
-    )
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -12,7 +12,7 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self
 
 from slam.errors import InvalidValueError
-from slam.frontend.config import FrontendConfig, RangeErrorConfig
+from slam.frontend.config import FrontendConfig
 from slam.landmarks.hypotheses import Gates
 from slam.settings import Settings, number, word
 from slam.tracker.belief.config import BeliefConfig
@@ -66,7 +66,6 @@ class TrackerConfig(Settings):
         "frontend.prior": "slam.frontend.odometry_prior",
         "frontend.bias": "slam.frontend.odometry_prior",
         "features.corners": "slam.frontend.corners",
-        "range_error": "slam.frontend.range_error",
     }
 
     cell_m: float = number(
@@ -129,7 +128,6 @@ class TrackerConfig(Settings):
     uncertainty: UncertaintyConfig = field(default=UncertaintyConfig())
     features: FeaturesConfig = field(default=FeaturesConfig())
     standing: StandingConfig = field(default=StandingConfig())
-    range_error: RangeErrorConfig = field(default=RangeErrorConfig())
 
     def __post_init__(self) -> None:
         super().__post_init__()

@@ -7,6 +7,7 @@ from collections.abc import Mapping
 from typing import Any
 
 _GROUPS = {
+    "": ("range_error",),
     "tracking": ("quality", "verdict"),
     "frontend": ("surfaces", "view", "prior"),
     "features": ("corners",),
@@ -26,7 +27,7 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
     ),
 }  # fmt: skip
 
-_LEFT = {"frontend.bias": ("per_m", "per_rad"), "range_error": ("learn",)}  # all others are gone
+_LEFT = {"frontend.bias": ("per_m", "per_rad")}  # all others are gone
 
 
 def updated(words: Any) -> Any:

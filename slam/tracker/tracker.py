@@ -20,7 +20,6 @@ from slam.estimate import Estimate
 from slam.frames import Float, Frame, Odometry
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction, inverted, turned
-from slam.frontend.range_error import RangeError
 from slam.path import PosePath
 from slam.tracker import map_file as memory
 from slam.tracker.belief.belief import Belief, Judged
@@ -28,7 +27,6 @@ from slam.tracker.belief.places import coarse
 from slam.tracker.belief.status import State, Status
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
-from slam.tracker.learnt_ranges import LearntRanges
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.matching.usual import Usual
 from slam.tracker.rasterise import rasterise
@@ -81,9 +79,6 @@ class Tracker(abc.ABC):
         self._standing = Standing(self.config.standing)
         self._vote, self._dragged = 1.0, 0.0
         self._trusted = True  # the pose of the frame before
-        empty = partial(self._new_map, self.config)
-        learns = self.config.range_error.learn == "on"
-        self._ranges = LearntRanges(self.config, self._matcher, empty) if learns else None
         self._path = PosePath()
 
     @staticmethod
@@ -107,8 +102,7 @@ class Tracker(abc.ABC):
         self._path.check_order(frame.stamp_ns)
         self._correct()
         prediction = self._predict(frame.odometry)  # 1 odometry prior
-        seen = frame if self._ranges is None else self._ranges.seen(frame)
-        observations = observe(seen, prediction.twist, self.config)  # 2 de-skewed points, view
+        observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
         observations = self._standing.with_votes(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
@@ -121,9 +115,6 @@ class Tracker(abc.ABC):
         match, state = judged.match, judged.state
         if state is State.TRACKING or not self._belief.certain:
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
-        if self._ranges is not None:
-            tracked = state is State.TRACKING and not match.slipped
-            self._ranges.learn(frame, prediction.twist, match.T_map_robot, tracked=tracked)
         return self._report(frame, match, state, judged.likeliest)
 
     def _first(self, frame: Frame) -> Estimate:
@@ -146,8 +137,6 @@ class Tracker(abc.ABC):
         if not self._trusted or not self._belief.certain or self._held or self._resumed is not None:
             return
         correction = self._loops.correction(self._path.poses)
-        if correction is None and self._ranges is not None:
-            correction = self._ranges.correction(self._loops, self._path.poses)
         if correction is None:
             return
         self.cell_map = correction.cell_map
@@ -158,8 +147,6 @@ class Tracker(abc.ABC):
         self._corrected_by[2] = se2.wrap(float(self._corrected_by[2]))
         self._path.replace(correction.poses)
         self._standing.moved(T)
-        if self._ranges is not None:
-            self._ranges.forget_views()
         self._pose_covariance.turned(float(T[2]))
         self._agreement.forget()
 
@@ -307,11 +294,6 @@ class Tracker(abc.ABC):
     def _doubtful(self) -> bool:
         """Whether three times that deviation is beyond the limit."""
         return 0.0 < self.config.standing.alert_m < 3.0 * self._pose_covariance.by_movers_m
-
-    @property
-    def learnt_error(self) -> RangeError | None:
-        """What is known of the scanner's systematic error; None where that is switched off."""
-        return None if self._ranges is None else self._ranges.error
 
     def displace(self, by: Float) -> None:
         """For experiments: from now on the pose is believed to be off by ``by`` (3,), map frame.

@@ -14,11 +14,10 @@ import pytest
 from scripts.comparison import maps, schema, tables
 from scripts.comparison.entry import scored
 from scripts.metrics import table
-from scripts.metrics.judged import DUE_S, Judged, lost_s
+from scripts.metrics.judged import Judged, lost_s
 from scripts.metrics.table import METRICS
 from scripts.single_run.score import scores
 from slam import Estimate, Trajectory, create
-from slam.errors import InvalidValueError
 from slam.replay import Track
 from tests.world2d import Drive, World2D, arena, frames, laser
 
@@ -97,8 +96,7 @@ def test_no_second_list_of_metrics():
             inside = getattr(node, "elts", None) or getattr(node, "keys", None) or []
             if len(_strings(inside) & set(METRICS)) > 6:
                 found.add(place)
-    computed_there = {"scripts/comparison/maps.py"}  # they fill the rows of the maps
-    assert found == computed_there
+    assert not found
 
 
 def _strings(nodes: list[ast.expr | None]) -> set[str]:
@@ -135,19 +133,6 @@ def test_silent_failures_are_far_beyond_what_is_claimed_and_trusted():
     assert share(judged(off, trusted=[1, 1, 1, 0, 1])) == pytest.approx(2 / 5)
     assert share(judged(off, sigma_m=0.07)) == 0.0  # within 3 sigma
     assert share(judged(off, sigma_m=0.0)) is None  # no claim
-
-
-def test_an_error_is_due_after_a_while_and_told_by_the_covariance_or_by_doubt():
-    off = np.array([*[0.0] * 10, *[0.15] * 20, *[0.0] * 10])
-    first = 10 + round(DUE_S / 0.2)
-    assert np.flatnonzero(judged(off).is_due()).tolist() == list(range(first, 30))
-    assert not judged(np.where(np.arange(40) < first, off, 0.0)).is_due().any()
-    assert not judged(off / 3.0).is_due().any()
-    assert np.flatnonzero(~judged(off).is_told()).tolist() == list(range(10, 30))
-    assert judged(off, sigma_m=0.051).is_told().all()
-    assert judged(off, trusted=[False] * 40).is_told().all()
-    with pytest.raises(InvalidValueError, match="covariances"):
-        replace(judged(off), covariances=None).is_told()
 
 
 def test_the_error_while_tracking_ends_with_the_loss():

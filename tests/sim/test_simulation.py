@@ -140,7 +140,7 @@ def test_wrong_settings_are_refused_by_name():
 RESUME = """
 import hashlib, sys
 from sim.simulation import Simulation
-simulation = Simulation("office", seed=5, dynamism=0.9, labels=True, tags="camera")
+simulation = Simulation("office", seed=5, dynamism=0.9, labels=True)
 simulation.world.set_command(0.3, 0.1)
 if sys.argv[1] == "resume":
     simulation.load_state(open(sys.argv[2], "rb").read())
@@ -156,9 +156,6 @@ for _ in range(90):
                  frame.odometry.increment_covariance, frame.odometry.twist,
                  frame.labels.displacement, frame.labels.kind, frame.labels.mixed):
         sha.update(part.tobytes())
-    tag = simulation.tag_reading
-    sha.update(repr((tag.stamp_ns, tag.arrival_ns)).encode() + tag.poses.tobytes()
-               + tag.camera.tobytes())
 print(frame.stamp_ns, sha.hexdigest())
 """
 
@@ -176,31 +173,6 @@ def test_a_state_of_another_simulation_is_refused():
         ours.load_state(Simulation("arena", seed=Seeds(1, odometry=2), n_chairs=2).save_state())
     with pytest.raises(InvalidValueError, match="this world is"):
         ours.load_state(Simulation("arena", seed=1, n_chairs=3).save_state())
-    tagged = Simulation("arena", seed=1, n_chairs=2, tags="camera")
-    with pytest.raises(InvalidValueError, match="ceiling cameras"):
-        ours.load_state(tagged.save_state())
-    with pytest.raises(InvalidValueError, match="ceiling cameras"):
-        tagged.load_state(ours.save_state())
-    other = Simulation("arena", seed=Seeds(1, tags=2), n_chairs=2, tags="camera")
-    with pytest.raises(InvalidValueError, match="their errors differ"):
-        tagged.load_state(other.save_state())
-
-
-def test_ceiling_cameras_know_the_robot_late_and_by_centimetres():
-    simulation = Simulation("arena", seed=3, dynamism=0.0, tags="camera", n_chairs=0)
-    simulation.world.set_command(0.3, 0.1)
-    errors = []
-    for _ in range(60):
-        simulation.observe()
-        reading = simulation.tag_reading
-        if reading is not None and np.isfinite(reading.poses[0]).all():
-            assert reading.arrival_ns <= simulation.world.time_ns
-            errors.append(reading.poses[0][:2] - simulation.world.robot_pose()[:2])
-    gaps = np.linalg.norm(errors, axis=1)
-    assert len(errors) > 40
-    assert 0.001 < np.median(gaps) < 0.1
-    with pytest.raises(InvalidValueError, match="tags must be"):
-        Simulation("arena", tags="gps")
 
 
 def moments(stated):

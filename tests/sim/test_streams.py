@@ -14,7 +14,7 @@ from sim.driving.pilot import Pilot
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 
-PARTS = ("layout", "chairs", "bins", "doors", "people", "lidar", "odometry", "driving", "tags")
+PARTS = ("layout", "chairs", "bins", "doors", "people", "lidar", "odometry", "driving")
 SECONDS = 5.0
 
 
@@ -24,9 +24,8 @@ def _state(*rngs: np.random.Generator) -> str:
 
 def draws(seeds: Seeds) -> dict[str, Any]:
     """What each part has drawn after some seconds; for schedules, event by event."""
-    simulation = Simulation(
-        "office", seed=seeds, dynamism=1.0, laser=Lms221Config(resolution_deg=1.0), tags="camera"
-    )
+    laser = Lms221Config(resolution_deg=1.0)
+    simulation = Simulation("office", seed=seeds, dynamism=1.0, laser=laser)
     world = simulation.world
     tour = Pilot(world).driver.goals
     initial = sorted(world.scene.initial.items())
@@ -53,7 +52,6 @@ def draws(seeds: Seeds) -> dict[str, Any]:
         "lidar": noise.hexdigest(),
         "odometry": (_state(simulation.encoders._rng), simulation.encoders.errors),
         "driving": tour.tolist(),
-        "tags": _state(simulation._tags._rng),
     }
 
 

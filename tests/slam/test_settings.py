@@ -140,7 +140,6 @@ def test_every_number_is_read_where_something_is_computed() -> None:
     [
         "frontend.spacing_m", "frontend.surfaces.slack", "frontend.view.silent_m",
         "frontend.prior.twist_s", "frontend.bias.lasts_s", "features.corners.cell_m",
-        "range_error.knot_m",
     ],
 )  # fmt: skip
 def test_a_number_that_is_a_constant_now_says_where(path: str) -> None:

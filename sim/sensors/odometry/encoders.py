@@ -22,7 +22,7 @@ from collections.abc import Mapping, Sequence
 from typing import Any
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import NDArray
 
 from sim.core import state
 from sim.core.checks import instance
@@ -43,8 +43,6 @@ class WheelOdometry:
     config  ``OdometryConfig`` or the name of a preset
     rng     drawn from three times at birth, five times at each ``update``, ten at each scan
     track   m between the true wheels
-    start   (3,) first pose in the odom frame
-    errors  Es, Eb, Ed of a known unit, instead of drawn ones
 
     Attribute ``errors``: Es, Eb, Ed of this run (truth, not for a robot to know).
     """
@@ -55,8 +53,6 @@ class WheelOdometry:
         rng: np.random.Generator | None = None,
         *,
         track: float = 0.33,
-        start: ArrayLike = (0.0, 0.0, 0.0),
-        errors: tuple[float, float, float] | None = None,
     ) -> None:
         self.config = preset(config) if isinstance(config, str) else config
         instance("odometry", self.config, OdometryConfig)
@@ -66,7 +62,7 @@ class WheelOdometry:
         c = self.config
         self._systematic_variances = (c.scale_std**2, c.track_std**2, c.diameter_ratio_std**2)
         drawn = self._rng.standard_normal(3).tolist()
-        self.errors = errors or (
+        self.errors = (
             1.0 + c.scale_std * drawn[0],
             1.0 + c.track_std * drawn[1],
             1.0 + c.diameter_ratio_std * drawn[2],
@@ -83,7 +79,6 @@ class WheelOdometry:
         self._parameters = np.array([*(std**2 for std in squares), *slips, *own])
         self._wheels: Float = np.zeros((3, 3))
         self._poses: Float = np.zeros((3, 3))
-        self._poses[:2] = np.array(start, dtype=np.float64)
         self._spread: Float = np.zeros((3, 3, 3))
 
     @property

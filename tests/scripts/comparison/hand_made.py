@@ -41,7 +41,7 @@ def scan_of(chair) -> tuple[np.ndarray, np.ndarray]:
     return np.array(ranges, dtype=np.float32), np.array(hit, dtype=np.int16)
 
 
-def recording(chairs, *, door_rad: float = 0.0) -> Recording:
+def recording(chairs) -> Recording:
     """A robot at the origin, which does not move; ``chairs`` (n, 2) where the chair is at scans."""
     frames, hits, poses = [], [], []
     for k, chair in enumerate(chairs):
@@ -56,7 +56,7 @@ def recording(chairs, *, door_rad: float = 0.0) -> Recording:
             )
         )
         hits.append(hit)
-        poses.append([[*chair, 0.0], [2.0, -3.0, math.pi / 2 + door_rad]])
+        poses.append([[*chair, 0.0], [2.0, -3.0, math.pi / 2]])
     return Recording(
         frames=frames,
         hit=np.array(hits),

@@ -16,7 +16,7 @@ def test_every_experiment_has_a_line():
     there = {
         path.stem
         for path in (ROOT / "scripts" / "experiments").glob("*.py")
-        if "__main__" in path.read_text(encoding="utf-8")
+        if '__name__ == "__main__"' in path.read_text(encoding="utf-8")
     }
     assert listed == there
     for link in re.findall(r"\]\((\w+\.md)\)", page):

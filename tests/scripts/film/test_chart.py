@@ -111,11 +111,6 @@ def test_nothing_and_a_single_number_can_be_painted():
     assert not (empty == GREEN).all(axis=2).any()
 
 
-def test_painting_again_gives_the_same():
-    pane, data = chart(), {"shunting": series(0.02, 0.01), "odometry": series(2.0, 0.1)}
-    np.testing.assert_array_equal(pane.paint(data, ()), pane.paint(data, ()))
-
-
 def test_a_heading_beyond_the_axis_is_marked():
     assert _turned(1.5, 2.0) == "+1.50°"
     assert _turned(15.5, 2.0) == "+15.50° ↑"

@@ -16,12 +16,11 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scripts.live import gate, served
+from scripts.live import gate
 from scripts.live.replay import Recorder
 from scripts.live.session import Opener
 from scripts.live.view import View
 from sim.view.moment import Moments
-from slam.errors import InvalidValueError, MissingDependencyError
 from slam.replay import Replay, systems_named
 from tests.scripts.report.browser import CHROMIUM, Browser
 
@@ -185,17 +184,6 @@ def test_nothing_left_the_machine_and_nothing_went_wrong(browser: Browser, view:
     own = ("http://127.0.0.1:", "data:", "blob:")
     assert [url for url in browser.requests if not url.startswith(own)] == []
     assert [line for line in browser.console if '"type": "error"' in line] == []
-
-
-def test_a_port_that_is_taken_is_named(view: View):
-    with pytest.raises(InvalidValueError, match=f"cannot listen at 127.0.0.1:{view.served.port}"):
-        View(OPENER, ("127.0.0.1", view.served.port))
-
-
-def test_without_viser_one_line_says_what_to_install(monkeypatch):
-    monkeypatch.setitem(sys.modules, "viser", None)
-    with pytest.raises(MissingDependencyError, match=r"pip install viser"):
-        served.require()
 
 
 def test_only_loopback_is_private():

@@ -208,14 +208,6 @@ class TestLift:
         assert first.save_state() == second.save_state()
 
 
-def test_one_seed_is_one_future(folder):
-    worlds = [World(room(folder, n_people=3), seed=6, dynamism=1.0) for _ in range(2)]
-    for world in worlds:
-        list(walk(world, 15.0))
-    assert worlds[0].save_state() == worlds[1].save_state()
-    assert worlds[0].data.joint("door0/slide").qpos[0] != 0.0
-
-
 def test_taken_out_it_stands_wide_open(folder):
     simulation = Simulation(room(folder), seed=1, dynamism=0.0)
     apply(simulation, Change(out=("door0",)))

@@ -15,7 +15,6 @@ from sim.driving.drive import TourConfig
 from sim.recording.recipe import Recipe
 from sim.sensors.lidar.models.lms221 import Lms221Config, RangeEffects
 from sim.sensors.odometry.config import OdometryConfig
-from sim.sensors.tag_cameras import TagCameraConfig
 from sim.simulation import Simulation
 from slam.errors import InvalidValueError
 
@@ -35,7 +34,6 @@ from slam.errors import InvalidValueError
         (OdometryConfig, "scale_std", "0.1"),
         (DriveConfig, "accel", None),
         (TourConfig, "v_max_mps", [0.5]),
-        (TagCameraConfig, "rate_hz", "30"),
     ],
 )
 def test_a_field_of_the_wrong_type_is_named(

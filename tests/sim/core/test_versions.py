@@ -157,7 +157,7 @@ def test_a_run_of_another_world_is_refused(tmp_path: Path, command: str):
 @pytest.mark.parametrize(
     "name",
     ["seed", "dynamism", "scene", "name", "laser", "labels", "odometry", "twin", "drive", "start",
-     "moving_share", "chairs", "tags", "seconds", "scanner", "options"],
+     "moving_share", "chairs", "seconds", "scanner", "options"],
 )  # fmt: skip
 def test_an_option_of_the_scene_takes_the_place_of_nothing_else(name: str, tmp_path: Path):
     with pytest.raises(InvalidValueError, match=f"'{name}' is none"):

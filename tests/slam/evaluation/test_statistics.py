@@ -11,7 +11,6 @@ from scipy.stats import binom, bootstrap
 
 from slam.errors import InvalidValueError
 from slam.evaluation.statistics import (
-    censored_median,
     median_interval,
     paired,
     quantile,
@@ -113,28 +112,3 @@ def test_the_sign_test_is_the_binomials():
 def test_a_failure_loses_to_whoever_came_through():
     found = paired([INF, INF, INF], [1.0, 2.0, 3.0], less_is_better=True)
     assert (found["losses"], found["median_difference"]) == (3, INF)
-
-
-def test_the_censored_median_by_hand():
-    """6-mercaptopurine of Freireich et al. (1963): 21 remissions in weeks, 12 of them went on."""
-    ended = [6, 6, 6, 7, 10, 13, 16, 22, 23]
-    went_on = [6, 9, 10, 11, 17, 19, 20, 25, 32, 32, 34, 35]
-    share = (18 / 21) * (16 / 17) * (14 / 15) * (11 / 12) * (10 / 11) * (6 / 7)
-    assert share > 0.5 >= share * (5 / 6)  # after 22 and after 23 weeks
-    assert censored_median(ended + went_on, [True] * 9 + [False] * 12) == 23.0
-    assert censored_median(ended[:-1] + went_on, [True] * 8 + [False] * 12) == INF
-
-
-def test_the_censored_median_without_censoring_and_without_an_end():
-    assert censored_median([3.0, 1.0, 2.0], [True] * 3) == 2.0
-    assert censored_median([3.0, 0.0, 2.0, 1.0], [True] * 4) == 1.0
-    assert censored_median([3.0, 1.0], [False] * 2) == INF
-    assert censored_median([], []) is None
-
-
-@pytest.mark.parametrize("wrong", [math.nan, INF, -INF])
-def test_a_duration_is_a_finite_number(wrong):
-    with pytest.raises(InvalidValueError, match=f"durations must be finite, got {wrong}"):
-        censored_median([1.0, wrong], [True, False])
-    with pytest.raises(InvalidValueError, match="2 durations must have as many ends, got 1"):
-        censored_median([1.0, 2.0], [True])
