@@ -88,7 +88,7 @@ class Loops(KeyFrames):
         return [*self._edges.values()]
 
     def work(self) -> None:
-        """Up to ``LoopsConfig.work`` units, fewer where frames come often, and the last task's rest."""
+        """Up to ``LoopsConfig.work`` units, fewer where frames come often; tasks are ended."""
         if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
         share = self.keys[-1].start_s / self.keys[-1].frame / RARE_S
