@@ -3,6 +3,8 @@
 
 from __future__ import annotations
 
+from array import array
+
 import numpy as np
 
 from slam.frames import Float
@@ -18,8 +20,8 @@ class PosePath:
     """
 
     def __init__(self) -> None:
-        self._stamps: list[int] = []
-        self._poses: list[Float] = []
+        self._stamps = array("q")
+        self._poses = array("d")  # three numbers each
         self._reported: dict[int, Float] = {}  # by frame, where it is not the motion's
 
     def __len__(self) -> int:
@@ -32,18 +34,18 @@ class PosePath:
     def add(self, stamp_ns: int, T_map_robot: Float, reported: Float | None = None) -> None:
         """The pose of one more frame, as its motion led there; ``reported``: if at another."""
         if reported is not None:
-            self._reported[len(self._poses)] = reported.copy()
+            self._reported[len(self._stamps)] = reported.copy()
         self._stamps.append(stamp_ns)
-        self._poses.append(T_map_robot.copy())
+        self._poses.extend(T_map_robot)
 
     def replace(self, poses: Float) -> None:
         """The frames so far were at these (n, 3)."""
-        self._poses = list(poses)
+        self._poses = array("d", poses.ravel())
         self._reported.clear()
 
     def poses(self) -> Float:
         """(n, 3) m, m, rad, as motion led."""
-        return np.array(self._poses, dtype=np.float64).reshape(-1, 3)
+        return np.array(self._poses).reshape(-1, 3)
 
     def reported(self) -> Float:
         """(n, 3) m, m, rad, as reported, or as corrected since."""

@@ -11,10 +11,12 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 from scipy import sparse
-from scipy.sparse.linalg import spsolve
+from scipy.sparse.linalg import splu
 
 from slam import se2
 from slam.frames import Float
@@ -23,6 +25,7 @@ INLIER = 11.3  # chi squared of 3 degrees of freedom, 99 %
 ROUNDS = 60
 STILL = 1e-5  # m or rad: largest step at which it has converged
 SHARPER = 1.4
+_SYMMETRIC: Any = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 DIGITS = 6  # of m and rad that a solution has: those beyond follow the processor's algebra
 
 
@@ -60,6 +63,7 @@ class Relaxation:
         self._information = np.array([e.information for e in edges])
         self._robust = np.array([e.robust for e in edges])
         self._rounds = 0
+        self._normal = _Normal(len(self.poses), self._a, self._b)
         squares = self._squares(self._residuals()[0])
         self._mu = max(2.0 * float(squares[self._robust].max(initial=0.0)) / INLIER, 1.0)
 
@@ -76,8 +80,8 @@ class Relaxation:
         weights = (scale / (self._squares(residuals) + scale)) ** 2
         self.weights = np.where(self._robust, weights, 1.0)
         information = self.weights[:, None, None] * self._information
-        step = _step(len(self.poses), self._a, self._b, residuals, to_a, to_b, information)
-        self.poses[1:] += step.reshape(-1, 3)
+        step = self._normal.step(residuals, np.concatenate([to_a, to_b], axis=2), information)
+        self.poses += step
         self._rounds += 1
         still = self._mu == 1.0 and float(np.abs(step).max()) < STILL
         self.done = still or self._rounds == ROUNDS
@@ -112,23 +116,53 @@ def _residuals(poses: Float, a: Float, b: Float, measured: Float) -> tuple[Float
     return out, by_a, by_b
 
 
-def _step(  # noqa: PLR0913 (arrays of one problem)
-    n: int, a: Float, b: Float, residuals: Float, to_a: Float, to_b: Float, information: Float
-) -> Float:
-    """Gauss-Newton step of poses 1..n-1, flat."""
-    jacobian = np.concatenate([to_a, to_b], axis=2)  # (m, 3, 6)
-    weighted = np.einsum("nji,njk->nik", jacobian, information)
-    blocks = weighted @ jacobian
-    gradient = np.einsum("nij,nj->ni", weighted, residuals)
-    index = np.concatenate([3 * a[:, None] + np.arange(3), 3 * b[:, None] + np.arange(3)], axis=1)
-    rows = np.repeat(index[:, :, None], 6, axis=2)
-    columns = np.repeat(index[:, None, :], 6, axis=1)
-    shape = (3 * n, 3 * n)
-    H = sparse.coo_matrix((blocks.ravel(), (rows.ravel(), columns.ravel())), shape=shape).tocsc()
-    g = np.zeros(3 * n)
-    np.add.at(g, index.ravel(), gradient.ravel())
-    step: Float = spsolve(H[3:, 3:] + 1e-9 * sparse.eye(3 * n - 3, format="csc"), -g[3:])
-    return step
+class _Normal:
+    """The normal equations of poses 1..n-1: where their numbers lie is worked out once.
+
+    Poses are eliminated by least degree, which leaves the factor of a map's graph sparse.
+    """
+
+    def __init__(self, n: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> None:
+        ends = np.stack([a, b], axis=1)
+        rows, columns = np.repeat(ends, 2, axis=1).ravel(), np.tile(ends, 2).ravel()
+        ones = sparse.csc_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n))
+        ones = ones[1:, 1:] + len(rows) * sparse.eye(n - 1, format="csc")
+        place = np.full(n, -1)  # in the order of elimination; the first pose is held fast
+        place[1:] = splu(ones, permc_spec="MMD_AT_PLUS_A", **_SYMMETRIC).perm_c
+        self._place = place
+        self._pulled = (3 * ends[:, :, None] + np.arange(3)).ravel()
+        rows, columns = place[rows], place[columns]
+        self._free = (rows >= 0) & (columns >= 0)
+        numbers = np.append(columns[self._free] * n + rows[self._free], (n + 1) * np.arange(n - 1))
+        blocks, slots = np.unique(numbers, return_inverse=True)
+        columns, rows = np.divmod(blocks, n)
+        first = np.searchsorted(columns, np.arange(n))  # block of each column of blocks
+        high = np.diff(first)
+        # a column of blocks is three of numbers, each three times as high
+        i = np.arange(3)
+        at = 9 * first[columns] + 3 * (np.arange(len(blocks)) - first[columns])
+        at = at[:, None, None] + i[:, None] + 3 * i * high[columns, None, None]
+        self._at = at[slots[: 1 - n]].ravel()
+        self._indices = np.empty(9 * len(blocks), np.int32)
+        self._indices[at] = 3 * rows[:, None, None] + i[:, None]
+        starts = 9 * first[:-1, None] + 3 * i * high[:, None]
+        self._starts = np.append(starts.ravel(), len(self._indices)).astype(np.int32)
+        self._diagonal = at[rows == columns][:, i, i].ravel()
+
+    def step(self, residuals: Float, jacobian: Float, information: Float) -> Float:
+        """(n, 3) step of Gauss-Newton; ``jacobian`` (m, 3, 6) by both ends of each edge."""
+        m = len(residuals)
+        weighted = jacobian.transpose(0, 2, 1) @ information
+        blocks = (weighted @ jacobian).reshape(m, 2, 3, 2, 3).transpose(0, 1, 3, 2, 4)
+        values = np.bincount(self._at, blocks.reshape(4 * m, 9)[self._free].ravel())
+        values[self._diagonal] += 1e-9
+        H = sparse.csc_matrix((values, self._indices, self._starts))
+        pull = np.bincount(self._pulled, (weighted @ residuals[:, :, None]).ravel())
+        moves = np.zeros((len(self._place), 3))
+        moves[self._place] = -pull.reshape(-1, 3)
+        moved = splu(H, permc_spec="NATURAL", **_SYMMETRIC).solve(moves[:-1].ravel())
+        step: Float = np.append(moved, np.zeros(3)).reshape(-1, 3)[self._place]
+        return step
 
 
 def carried(before: Float, after: Float, at: Float, poses: Float) -> Float:

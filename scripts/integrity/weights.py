@@ -23,7 +23,7 @@ from slam.frames import Float
 from slam.tracker.belief.config import BeliefConfig
 
 JOINT = ("confirmed", "confirmed_m", "through_per_m", "outdated", "changed_per_m", "place")
-FIXED = ("confirmed_share", "linear_m")  # of the evidence, too; set by hand
+FIXED = ("linear_m",)  # of the evidence, too; set by hand
 ALONE = ("nearby_per_m", "searched", "broken")
 SCANS = 500.0  # that all labels together count, against the prior of ``SPREAD``
 SPREAD = 3.0  # deviation of the logarithm of a weight about its start: keeps what no scan tells
@@ -90,8 +90,7 @@ class Scans:
 
 def evidence(values: Values, known: Float, through: Float) -> Float:
     """Nats for places, as ``slam.tracker.belief.posterior.Odds.evidence`` (a test holds that)."""
-    chance = values["confirmed_m"] + values["confirmed_share"] * through
-    one_view = np.minimum(known, values["linear_m"])
+    chance, one_view = values["confirmed_m"], np.minimum(known, values["linear_m"])
     more = np.log1p(one_view / chance) + (known - one_view) / (chance + one_view)
     beyond = through - values["outdated"] / values["through_per_m"]
     denied = np.where(

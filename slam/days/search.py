@@ -29,12 +29,10 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
-from slam.tracker.belief.config import RelocaliseConfig
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State
-from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
@@ -46,6 +44,7 @@ BUFFER = 200  # scans, kept to be merged when the place is found
 BUFFER_M, BUFFER_RAD = 0.1, 0.15  # m driven or rad turned between two of them
 ASKED = 20  # scans of those kept, evenly taken, that a place found late is asked for
 AGREED = 0.75  # share of the usual match, in a map without days, of those asked
+ASKED_AGAIN = 10.0  # times belief.frozen_above that may be left: whether it fits is asked, too
 FITS = 0.5  # share of the scans after the find that must be tracked
 # Whether a session fits the days before; set by hand.
 ALWAYS = 0.7  # share of the looks of all sessions: always stands
@@ -189,8 +188,7 @@ class StartSearch:
         self._belief, self._budget = numbers.belief, numbers.matching.budget
         changed = replace(numbers.belief, outdated=0.0)  # rooms have, since: all places pay alike
         self._odds = Odds(changed, numbers.carried_per_h)
-        places = _places_in(known.cell_map, numbers.tracking.relocalise)
-        self._prior = -math.log(places) - numbers.belief.outdated
+        self._prior = -numbers.belief.place - numbers.belief.outdated
         self.seen: list[tuple[Frame, Float]] = []
         self.alone = type(known)(numbers)
         self.alone.hold_map()
@@ -291,7 +289,7 @@ class StartSearch:
         """T_map_own (3,), where one place is certain, and no other is still to be asked."""
         if self._late or not self._places.searches:
             return None
-        sure = 1.0 - self._belief.frozen_above
+        sure = 1.0 - ASKED_AGAIN * self._belief.frozen_above
         for place, start in zip(self._places.followed, self.starts(), strict=True):
             if place.waited == 0 and start.probability >= sure:
                 return start.T_map_own if self._fits(start.T_map_own) else None
@@ -364,10 +362,3 @@ class StartSearch:
             step = min(max(one.elapsed, 1e-3), known.config.map.longest_look_s)
             cell_map.integrate(one.observations.view, T_map_laser, step, write=True)
         return len(self._kept)
-
-
-def _places_in(cell_map: CellMap, config: RelocaliseConfig) -> float:
-    """How many places that are not one fit into the rectangle around the map; at least 1."""
-    i0, j0, i1, j1 = cell_map.extent() or (0, 0, 0, 0)
-    area = (i1 - i0) * (j1 - j0) * cell_map.cell**2
-    return max(area / config.same_m**2 * math.tau / config.same_rad, 1.0)

@@ -13,6 +13,7 @@ from slam._jit import inner
 NEAR_CELLS = 3.0  # cells; neighbouring hits this near are of one surface; set by hand
 LONGEST_M = 1.0  # m, longest stretch between two joined hits; set by hand
 LINE_HITS = 4  # hits on one line: a surface between distant hits; set by hand
+LOST_BEAMS = 1  # beams, most without a valid return between two hits of one surface; set by hand
 LIKE_STEPS = 4.0  # ratio of neighbouring steps along a surface, at most; set by hand
 SLACK_M = 0.04  # m; a hit may lie this far off its line, along the beam; set by hand
 SLACK = 0.15  # the same as a share of the step: the larger of both holds; set by hand
@@ -111,9 +112,10 @@ def follow_ends(
 ) -> None:
     """Fill the tangents where a surface is no longer seen, but need not end.
 
-    An end is one only where the next beam sees past it, or has no valid return though it would
-    meet the surface in range. Behind something nearer, beyond the range or the last beam the
-    surface may go on, and its last hit says nothing along it: it moves with the robot.
+    An end is one only where the next valid beam sees past it, or where more than ``LOST_BEAMS``
+    have no valid return though they would meet the surface in range. Behind something nearer,
+    beyond the range or the last beam the surface may go on, and its last hit says nothing along it:
+    it moves with the robot.
     ``sweep``: rad between beams, how many there are, and the range (m) of their use.
     """
     n = len(points)
@@ -135,10 +137,11 @@ def follow_ends(
                 continue
             tx, ty = (points[k, 0] - points[first, 0]) / length, points[k, 1] - points[first, 1]
             ty /= length
-            ahead = _onward(points, k, origin, tx, ty, sweep[0])
-            step = abs(beams[k] - beams[before])
-            beam = beams[k] + (beams[k] - beams[before]) // max(step, 1)
-            near = 0 <= after < n and beams[after] == beam
+            gone = beams[k] - beams[before]  # the way that the beams go
+            beam = beams[k] + (1 if gone > 0 else -1)
+            on = abs(beams[after] - beams[k]) if 0 <= after < n else 0
+            near = 0 < on <= 1 + LOST_BEAMS
+            ahead = _onward(points, k, origin, tx, ty, sweep[0] * (on if near else 1))
             if near:
                 seen = _range(points, after, origin)
                 slack = max(SLACK_M, SLACK * (ahead - _range(points, k, origin)))
@@ -154,9 +157,9 @@ def _onward(
     points: NDArray[np.float64], k: int, origin: NDArray[np.float64], tx: float, ty: float,
     increment: float,
 ) -> float:  # fmt: skip
-    """Range (m) at which the next beam meets the line through hit ``k`` along (tx, ty); inf: never.
+    """Range (m) at which a beam meets the line through hit ``k`` along (tx, ty); inf: never.
 
-    The next one on that side to which (tx, ty) leads.
+    The one that is turned by ``increment`` to the side to which (tx, ty) leads.
     """
     x, y = points[k, 0] - origin[0], points[k, 1] - origin[1]
     turn = abs(increment) if x * ty - y * tx > 0.0 else -abs(increment)

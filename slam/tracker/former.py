@@ -14,6 +14,7 @@ _GROUPS = {
 }
 _NUMBERS: dict[str, tuple[str, ...]] = {
     "frontend": ("spacing_m", "least_weight"),
+    "belief": ("confirmed_share",),
     "standing": (
         "better", "doubtful_m", "explains", "fallen", "fallen_s", "outvoted", "rival_gain",
         "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans", "undecided_s",

@@ -14,7 +14,7 @@ import math
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.surfaces import turned_face
@@ -194,7 +194,7 @@ def _is_covered(cells: Cells, box: NDArray[np.float64], size: float) -> bool:
     return bool(inside and math.floor(box[3] / size) + 2 <= cy + rows)
 
 
-@njit
+@uncounted
 def _stamp(  # noqa: PLR0913 (kernel)
     cells: Cells,
     points_robot: NDArray[np.float64],

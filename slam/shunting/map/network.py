@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 from slam.frontend.surfaces import opposite
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.tracker.cell_map import CellMap
@@ -79,7 +79,7 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
     return total
 
 
-@njit
+@uncounted
 def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
     cells: Cells,
     view: View,

@@ -16,25 +16,22 @@ class BeliefConfig(Settings):
     """Evidence in nats, priors as rates: docs/belief.md."""
 
     confirmed: float = number(
-        5.9, "nats", "a: of long-known surface C that scans confirm from a place, a log(1 + C / c)",
+        3.6, "nats", "a: of long-known surface C that scans confirm from a place, a log(1 + C / c)",
         FITTED,
     )  # fmt: skip
-    confirmed_m: float = number(0.94, "m", "c: less than it may be confirmed by chance", FITTED,
+    confirmed_m: float = number(0.47, "m", "c: less than it may be confirmed by chance", FITTED,
         low=1e-3)  # fmt: skip
     linear_m: float = number(
         6.0, "m", "of surface from which on it counts a metre alike: more than one view shows"
     )
-    confirmed_share: float = number(
-        0.15, "m/m", "of what is seen through, added to c: a wrong place confirms and contradicts",
-    )  # fmt: skip
     through_per_m: float = number(
-        3.1, "nats/m", "b: of long-known surface that they see through", FITTED, low=1e-3
+        3.0, "nats/m", "b: of long-known surface that they see through", FITTED, low=1e-3
     )
     outdated: float = number(
-        2.7, "nats", "price of a room that has changed: b to there, changed_per_m beyond", FITTED
+        4.4, "nats", "price of a room that has changed: b to there, changed_per_m beyond", FITTED
     )
     changed_per_m: float = number(
-        0.49, "nats/m", "of long-known surface that is seen through in such a room", FITTED
+        0.64, "nats/m", "of long-known surface that is seen through in such a room", FITTED
     )
     broken: float = number(
         8.5, "nats", "that it costs if hardly a return goes on from the scans before", low=1e-3
@@ -52,7 +49,7 @@ class BeliefConfig(Settings):
         "motion led", FITTED,
     )  # fmt: skip
     place: float = number(
-        5.0, "nats", "a place found must explain: the best of all is better than any one", FITTED
+        5.9, "nats", "a place found must explain: the best of all is better than any one", FITTED
     )
     searched: float = number(
         4.0, "nats", "evidence of a search that is done: what it did not find is not there", FITTED

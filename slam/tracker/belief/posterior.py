@@ -42,10 +42,9 @@ class Odds:
         known, through = (of.known, of.through) if isinstance(of, Look) else (
             of.known_m, of.through_m
         )  # fmt: skip
-        chance = config.confirmed_m + config.confirmed_share * through
-        one_view = min(known, config.linear_m)
-        more = (known - one_view) / (chance + one_view)
-        return config.confirmed * (math.log1p(one_view / chance) + more) - self.denied(through)
+        one_view, chance = min(known, config.linear_m), config.confirmed_m
+        more = math.log1p(one_view / chance) + (known - one_view) / (chance + one_view)
+        return config.confirmed * more - self.denied(through)
 
     def denied(self, through_m: float) -> float:
         """Nats against a place: b a metre, or the price of a room that has changed."""

@@ -16,7 +16,7 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.few import Widths, blur, room_for
 from slam.tracker.matching.local_search import Around, SearchWindow, search
-from slam.tracker.matching.score import Climb, Reward, Seen, refine
+from slam.tracker.matching.score import SCRATCH, Climb, Reward, Seen, refine
 
 
 def seen_by(observations: Observations) -> Seen:
@@ -95,6 +95,7 @@ class Matcher:
         self.numbers = config.matching
         steps = self.numbers.climb
         self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
+        self._scratch = np.empty(SCRATCH)
 
     def climb(
         self,
@@ -122,6 +123,7 @@ class Matcher:
                 precision,
                 tau,
                 information,
+                self._scratch,
             )
             overlapped = count / full
             matched = count / (full - absent) if count > 0.0 else 0.0
@@ -161,7 +163,7 @@ class Matcher:
         pose = np.array(prediction, dtype=np.float64)
         refine(
             cell_map.cells, self.reward, self._climb, few, pose, prediction,
-            inverted(covariance), self.config.reward, np.zeros((3, 3)),
+            inverted(covariance), self.config.reward, np.zeros((3, 3)), self._scratch,
         )  # fmt: skip
         return pose
 

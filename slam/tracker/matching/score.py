@@ -14,7 +14,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 from slam.frontend.surfaces import opposite, turned_face
 from slam.tracker.cells import MASK, SHIFT, Cells
 
@@ -35,6 +35,9 @@ class Reward(NamedTuple):
     tail: float
     tail_cells: float
     young_trace: float
+
+
+SCRATCH = (13, 3)  # shape of the room that ``refine`` works in
 
 
 class Climb(NamedTuple):
@@ -72,22 +75,21 @@ class Field(NamedTuple):
 
 
 @inner
-def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
+def _overlap(  # noqa: PLR0915 (kernel)
     field: Field,
     reach: tuple[float, float, float, float],
     u: float,
     v: float,
     cov: tuple[float, float, float],
     faced: int,
-    out: NDArray[np.float64],
-) -> None:
+) -> tuple[float, float, float, float, float, float]:
     """Overlap f of a Gaussian at (u, v) with the map, its gradient and its negative curvature.
 
     (u, v) and ``cov`` (xx, xy, yy) are in cells, cell (i, j) lies at (i, j). f is the sum over
     cells of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Cells
     of a surface that faces away from the observed one (``faced``) do not count. ``reach``: weight
     of x, the bounds of the Gaussian, and what is closed of a faint trace y: y (1 - closed (1 - y)).
-    ``out``: f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
+    Returns f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
     """
     short_term, tail, tail_cells, closed = reach
     a, b, d = cov
@@ -149,12 +151,14 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
         weight *= climb
         climb *= slowing
     norm = 1.0 / (math.pi * math.sqrt(det))
-    out[0] = norm * m0
-    out[1] = norm * (pa * mu + pb * mv)
-    out[2] = norm * (pb * mu + pd * mv)
-    out[3] = norm * (pa * m0 - (pa * pa * muu + 2.0 * pa * pb * muv + pb * pb * mvv))
-    out[4] = norm * (pb * m0 - (pa * pb * muu + (pa * pd + pb * pb) * muv + pb * pd * mvv))
-    out[5] = norm * (pd * m0 - (pb * pb * muu + 2.0 * pb * pd * muv + pd * pd * mvv))
+    return (
+        norm * m0,
+        norm * (pa * mu + pb * mv),
+        norm * (pb * mu + pd * mv),
+        norm * (pa * m0 - (pa * pa * muu + 2.0 * pa * pb * muv + pb * pb * mvv)),
+        norm * (pb * m0 - (pa * pb * muu + (pa * pd + pb * pb) * muv + pb * pd * mvv)),
+        norm * (pd * m0 - (pb * pb * muu + 2.0 * pb * pd * muv + pd * pd * mvv)),
+    )
 
 
 @inner
@@ -184,7 +188,7 @@ def _positive_part(a: float, b: float, d: float) -> tuple[float, float, float]:
     return a, b, d
 
 
-@njit
+@uncounted
 def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     cells: Cells,
     reward: Reward,
@@ -205,7 +209,6 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     along[:] = 0.0
     information[:] = 0.0
     score, matched, absent = 0.0, 0.0, 0.0
-    out = np.empty(6)
     scale = 1.0 / reward.cell
     field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -217,14 +220,14 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
         vote = seen.votes[k]
         closed = reward.young_trace * (1.0 - vote)
         reach = reward.short_term * vote, reward.tail, reward.tail_cells, closed
-        _overlap(field, reach, u, v, cov, turned_face(seen.facings[k], pose[2]), out)
-        f = out[0]
+        faced = turned_face(seen.facings[k], pose[2])
+        f, gx, gy, a, b, d = _overlap(field, reach, u, v, cov, faced)
         if f > reward.matched_overlap:
             matched += seen.weights[k]
         else:
             absent += seen.weights[k] * (1.0 - vote)
-        gx, gy = out[1] * scale, out[2] * scale
-        a, b, d = out[3] * scale * scale, out[4] * scale * scale, out[5] * scale * scale
+        gx, gy = gx * scale, gy * scale
+        a, b, d = a * scale * scale, b * scale * scale, d * scale * scale
         if reward.logarithm:
             inverse = 1.0 / (reward.log_floor + f)
             score += seen.weights[k] * math.log(reward.log_floor + f)
@@ -291,7 +294,7 @@ def _solve(
     step[0] = (a - l10 * step[1] - l20 * step[2]) / l00
 
 
-@njit
+@uncounted
 def refine(  # noqa: C901, PLR0913 (kernel)
     cells: Cells,
     reward: Reward,
@@ -302,6 +305,7 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     precision: NDArray[np.float64],
     tau: float,
     information: NDArray[np.float64],
+    scratch: NDArray[np.float64],
 ) -> tuple[float, float, float, float]:
     """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
 
@@ -309,11 +313,12 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     one. The slope of the reward along observed surfaces is left out of it: there it only says where
     the map is older, which would hold a robot back in a corridor. Returns reward, prior, the weight
     of matched observations and that of unmatched ones without a vote, and leaves the data's
-    information (without tau and prior) in ``information``, all as before the last step.
+    information (without tau and prior) in ``information``, all as before the last step. What is in
+    ``scratch`` (``SCRATCH``) does not matter.
     """
-    gradient, along, slope, step = np.empty(3), np.empty(3), np.empty(3), np.empty(3)
-    trial, trial_gradient, trial_along = np.empty(3), np.empty(3), np.empty(3)
-    trial_information, H = np.empty((3, 3)), np.empty((3, 3))
+    gradient, along, slope, step = scratch[0], scratch[1], scratch[2], scratch[3]
+    trial, trial_gradient, trial_along = scratch[4], scratch[5], scratch[6]
+    trial_information, H = scratch[7:10], scratch[10:13]
     rewarded, matched, absent = evaluate(cells, reward, seen, pose, gradient, along, information)
     prior = _prior(pose, prediction, precision, slope)
     damping = climb.damping

@@ -168,7 +168,9 @@ class Closures:
         """
         cell_map = self._submaps.pop(middle, None)
         if cell_map is None:
-            about = range(middle - self._numbers.submap, middle + self._numbers.submap + 1)
+            way_m, after_m = self._keys[middle].way_m, self._numbers.after_m
+            near = range(middle - self._numbers.submap, middle + self._numbers.submap + 1)
+            about = [k for k in near if abs(self._keys[k].way_m - way_m) <= after_m]
             before = self.spent
             cell_map = self._map_of(about, middle)
             if middle in self._drawn:
@@ -180,6 +182,13 @@ class Closures:
             del self._submaps[oldest]
             self._fields.pop(oldest, None)
         return cell_map
+
+    def restart(self, poses: list[Float]) -> None:
+        """Other key frames, (3,) each."""
+        self.chained = list(poses)
+        self._submaps.clear()
+        self._fields.clear()
+        self._drawn.clear()
 
     def _map_of(self, members: Iterable[int], origin: int) -> CellMap:
         """What some key frames saw, in the frame of one, as the chain puts them."""

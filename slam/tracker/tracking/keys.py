@@ -4,7 +4,7 @@
 from __future__ import annotations
 
 import math
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 
@@ -13,6 +13,7 @@ from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.tracker.belief.places import spread
 from slam.tracker.tracking.config import LoopsConfig
+from slam.tracker.tracking.merging import Merge
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -54,6 +55,8 @@ class KeyFrames:
         self._covariance: Float = np.zeros((3, 3))
         self._found = False
         self._squares: list[float] = []  # m^2, of the range, mean of each key frame
+        self._frames: list[int] = []  # of all key frames there ever were
+        self._stand: list[int] = []  # which of the key frames stands for each of them
 
     def add(  # noqa: PLR0913 (the facts of one frame)
         self,
@@ -81,6 +84,8 @@ class KeyFrames:
         near = moved < self._config.key_m and abs(float(self._step[2])) < self._config.key_rad
         if self.keys and near:
             return
+        self._frames.append(frame)
+        self._stand.append(len(self.keys))
         self.keys.append(
             KeyFrame(
                 frame=frame,
@@ -98,6 +103,21 @@ class KeyFrames:
         self._squares.append(float((points * points).sum(axis=1).mean()) if len(points) else 0.0)
         self._step, self._covariance = np.zeros(3), np.zeros((3, 3))
         self._found = False
+
+    def leave(self, merge: Merge) -> None:
+        """Only the key frames that are left; a step is from the one before among them."""
+        keys = merge.rows(self.keys)
+        for at, before, k in zip(range(1, len(keys)), merge.left, merge.left[1:], strict=False):
+            step, covariance = self.keys[before + 1].step, self.keys[before + 1].covariance
+            for key in self.keys[before + 2 : k + 1]:
+                own = key.covariance - self.slack
+                covariance = se2.propagate(covariance, step, key.step, own)
+                step = se2.compose(step, key.step)
+            keys[at] = replace(keys[at], step=step, covariance=covariance)
+        into = [*merge.into.tolist(), *range(len(merge.left), len(keys))]
+        self._stand = [into[k] for k in self._stand]
+        self._squares = merge.rows(self._squares)
+        self.keys[:] = keys
 
     def anywhere(self, T_map_robot: Float) -> Float:
         """(3, 3) second moment about a pose if the robot is anywhere that it has seen.

@@ -28,6 +28,7 @@ from slam.tracker.matching.matcher import Matcher
 from slam.tracker.tracking.anchors import map_errors
 from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
+from slam.tracker.tracking.merging import LEFT, MOST_KEYS, Merge
 from slam.tracker.tracking.passages import Passages
 from slam.tracker.tracking.redraw import Correction, Redrawing
 
@@ -67,6 +68,7 @@ class Loops(KeyFrames):
         self._links: set[tuple[int, int]] = set()  # over losses: not found by matching
         self._tied_to: set[int] = set()  # key frames with ties
         self._again = 0
+        self._most = MOST_KEYS  # key frames in the graph, before some are merged
         self._relaxation: Relaxation | None = None
         self._relaxed: list[tuple[int, int]] = []  # loops in it
         self._fresh = 0  # loops since the last one
@@ -113,6 +115,8 @@ class Loops(KeyFrames):
     def map_error(self, frame: int) -> Float | None:
         """(3, 3) by which the map is off here, where ``frame`` is a key frame and loops have just
         been weighed; else None: the error of the frame before has grown by what was driven.
+
+        A corrected map may have moved its first key frame: by that it is off the known start, too.
         """
         if not self._weighed or self.keys[-1].frame != frame:
             return None
@@ -122,8 +126,17 @@ class Loops(KeyFrames):
             for pair, edge in self._edges.items()
             if self.weights.get(pair, 0.0) > 0.5 and pair not in self._links
         }
+        held |= {(edge.a, edge.b): edge for edge in self._chain if edge.b > edge.a + 1}
         found = spread(self._numbers.loop_m, self._numbers.loop_rad)
-        return map_errors(self.keys, self._all_poses(), held, self.slack, found)[-1]
+        error = map_errors(self.keys, self._all_poses(), held, self.slack, found)[-1]
+        here = self.keys[-1].T_map_robot
+        off = self._from_start(self.keys[0].T_map_robot, here) - here
+        off[2] = se2.wrap(float(off[2]))
+        return error + np.multiply.outer(off, off)
+
+    def _from_start(self, first: Float, T_map_robot: Float) -> Float:
+        """(3,) a pose of a map that has the first key frame at ``first``, in the known start's."""
+        return se2.compose(self._first, se2.between(first, T_map_robot))
 
     def corrected(self, poses: Float) -> Float:
         """All (n, 3) poses so far, moved with the graph; the same while the map is not torn.
@@ -134,8 +147,7 @@ class Loops(KeyFrames):
         if self.way_m < self._numbers.long_m or not (self._moved or self._torn_keys(1.0)):
             return poses
         after = self._all_poses()
-        T = se2.compose(self._first, se2.inverse(after[0]))
-        return self._carried(np.array([se2.compose(T, pose) for pose in after]), poses)
+        return self._carried(np.array([self._from_start(after[0], one) for one in after]), poses)
 
     def _all_poses(self) -> list[Float]:
         """By the graph; of key frames that it does not have yet, as they followed online."""
@@ -147,9 +159,8 @@ class Loops(KeyFrames):
 
     def _carried(self, after: Float, poses: Float) -> Float:
         before = np.array([key.T_map_robot for key in self.keys])
-        frames = np.array([key.frame for key in self.keys])
-        at = np.interp(np.arange(len(poses)), frames, np.arange(len(frames)))
-        return carried(before, after, at, poses)
+        at = np.interp(np.arange(len(poses)), self._frames, np.arange(len(self._frames)))
+        return carried(before[self._stand], after[self._stand], at, poses)
 
     def _task(self) -> int:
         """One piece of work; its cost in units, 0 if there is none."""
@@ -165,7 +176,8 @@ class Loops(KeyFrames):
             self._search(self._searched)
             self._searched += 1
             return 1 + self.closures.spent
-        if self._fresh and (self._surprised or self._fresh >= self._numbers.batch):
+        solve = self._fresh and (self._surprised or self._fresh >= self._numbers.batch)
+        if solve or len(self.poses) > self._most:
             self._relaxed = list(self._edges)
             self._relaxation = Relaxation(np.array(self.poses), self._chain + self.edges)
             return 1
@@ -264,9 +276,43 @@ class Loops(KeyFrames):
         self.weights = dict(zip(self._relaxed, weights, strict=True))
         self.poses = list(relaxation.poses)
         self._relaxation, self._surprised, self._fresh = None, False, 0
-        self._weighed = True
-        self._new_graph = True
+        self._weighed = self._new_graph = True
+        if len(self.poses) > self._most:
+            self._merge()
         return 1
+
+    def _merge(self) -> None:
+        """Let older key frames stand for those that are tied near them."""
+        graph, numbers = np.array(self.poses), self._numbers
+        merge = Merge.of(graph, self._may_go(), numbers.key_m, numbers.key_rad)
+        self._most = max(MOST_KEYS, round(len(merge.left) / LEFT))
+        loose = spread(numbers.loop_m, numbers.loop_rad)
+        links = merge.joined([self._edges[pair] for pair in sorted(self._links)], graph, loose)
+        self._chain = merge.joined(self._chain, graph, loose)
+        stay = {pair: new for pair in self._edges if (new := merge.pair(pair))}
+        found = [edge for pair, edge in self._edges.items() if pair not in self._links]
+        self._edges = {(edge.a, edge.b): edge for edge in links + merge.those(found)}
+        self._links = {(edge.a, edge.b) for edge in links}
+        self._pending = merge.those(self._pending)
+        self.weights = {stay[pair]: weight for pair, weight in self.weights.items() if pair in stay}
+        self._rough = {stay[pair][1]: stay[pair] for pair in self._rough.values() if pair in stay}
+        self._tied_to = {k for old in self._tied_to if (k := merge.number(old)) is not None}
+        self._ties = deque(k for old in self._ties if (k := merge.number(old)) is not None)
+        self._later = deque(pair for old in self._later if (pair := merge.pair(old)))
+        self._tied, self._again = merge.rows(self._tied), 0
+        self._searched += len(merge.left) - len(self.poses)
+        self.poses = merge.rows(self.poses)
+        self.leave(merge)
+        self.closures.restart(self.poses)
+
+    def _may_go(self) -> NDArray[np.bool_]:
+        """(n,) key frames near one with a closure that holds, up to the last few."""
+        near, last = self._numbers.every, self._numbers.recent + 2 * self._numbers.submap
+        tied = np.zeros(min(self._searched, len(self.poses) - last), np.bool_)
+        for pair, weight in self.weights.items():
+            if weight > 0.5 and pair in self._edges and pair not in self._links:
+                tied[max(pair[1] - near, 1) : pair[1] + near + 1] = True
+        return tied
 
     def _follow(self) -> None:
         """Begin a new map if the graph denies places of the present one."""
@@ -308,7 +354,9 @@ class Loops(KeyFrames):
             return 0
         online = np.array([key.T_map_robot for key in self.keys[: len(self.poses)]])
         near, last = self._numbers.submap, max(b for _, b in held)
-        pairs = np.array(held + [(k - near, k) for k in range(near, last)])
+        near_by = [(k - near, k) for k in range(near, last)
+                   if self._passages.way(k - near, k) <= self._numbers.after_m]  # fmt: skip
+        pairs = np.array(held + near_by)
         torn = set(pairs[self._torn(pairs, online, np.array(self.poses)), 1].tolist())
         return len(torn) if len(torn) >= self._numbers.denying else 0
 

@@ -73,6 +73,7 @@ class PoseCovariance:
         """Found again somewhere in the map, to within ``covariance`` (3, 3)."""
         self._blind = covariance.copy()
         self._by_movers = np.zeros((3, 3))
+        self.unseen_s = 0.0
 
     def resumed(self, covariance: Float) -> None:
         """Going on in a map of before, which is off by ``covariance`` (3, 3) as a whole."""
@@ -169,6 +170,7 @@ class PoseCovariance:
         part = turned(np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, 0.0]]), by)
         self._new_geometry = [float(part[0, 0]), float(part[0, 1]), float(part[1, 1])]
         self._by_movers = turned(self._by_movers, by)
+        self.along_rad = None if self.along_rad is None else self.along_rad + by
         self.covariance = self._drift + self._blind + self._shared
 
     def _fewer(self) -> float:

@@ -24,11 +24,11 @@ from slam.tracker.belief.posterior import Odds
 
 TRUE = {
     "confirmed": 4.0, "confirmed_m": 0.6, "through_per_m": 3.0, "outdated": 4.5,
-    "changed_per_m": 0.3, "place": 3.0, "confirmed_share": 0.1, "linear_m": 5.0,
+    "changed_per_m": 0.3, "place": 3.0, "linear_m": 5.0,
 }  # fmt: skip
 START = {
     "confirmed": 7.0, "confirmed_m": 1.2, "through_per_m": 6.0, "outdated": 7.0,
-    "changed_per_m": 0.6, "place": 5.0, "confirmed_share": 0.1, "linear_m": 5.0,
+    "changed_per_m": 0.6, "place": 5.0, "linear_m": 5.0,
 }  # fmt: skip
 
 

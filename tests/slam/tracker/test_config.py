@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("728f01875a73", "a2c0b1947d5c")),
-        (OccupancyConfig, ["grid"], ("8dfcd9f8d785", "ce776039970a")),
+        (ShuntingConfig, [], ("1637a9b2e828", "59ebbd058761")),
+        (OccupancyConfig, ["grid"], ("e733075c55fc", "b62a55d0b22e")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

@@ -68,15 +68,6 @@ def test_what_is_confirmed_counts_ever_less_and_then_alike(through_m: float) -> 
     assert after == pytest.approx(before, rel=1e-3)
 
 
-def test_what_is_seen_through_lessens_what_is_confirmed() -> None:
-    """A wrong place confirms by chance as much as it denies by right."""
-    for known_m in (0.5, 3.0, 3.0 * CONFIG.linear_m):
-        clear = nats(known_m) + ODDS.denied(0.0)
-        denied = nats(known_m, 1.0) + ODDS.denied(1.0)
-        assert 0.0 < denied < clear
-        assert nats(known_m, 1.0) < nats(known_m)
-
-
 def test_the_price_of_a_changed_room_has_no_step() -> None:
     assert ODDS.denied(KINK_M) == pytest.approx(CONFIG.outdated)
     assert ODDS.denied(0.5 * KINK_M) == pytest.approx(0.5 * CONFIG.outdated)
