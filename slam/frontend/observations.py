@@ -14,7 +14,7 @@ from typing import Any, Protocol
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, LaserSpec, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig
@@ -101,7 +101,7 @@ class Observations:
         return other
 
 
-@njit
+@uncounted
 def _scanned(  # noqa: PLR0913 (kernel)
     ranges: NDArray[np.float32],
     angles: NDArray[np.float64],
@@ -154,9 +154,9 @@ def _cleared(
     origin: NDArray[np.float64],
     joined: NDArray[np.bool_],
     tangents: NDArray[np.float64],
+    clear: NDArray[np.uint8],
 ) -> int:
-    """Move the hits that are no mixed pixel to the front; how many there are."""
-    clear = np.empty(len(points), np.bool_)
+    """Move the hits that are no mixed pixel to the front; how many there are. ``clear``: room."""
     count = unmixed(points, beams, origin, joined, clear)
     if count < len(points):
         m = 0
@@ -168,7 +168,7 @@ def _cleared(
     return count
 
 
-@njit
+@uncounted
 def _surveyed(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
@@ -188,7 +188,7 @@ def _surveyed(  # noqa: PLR0913 (kernel)
     """
     join(points, beams, origin, near, joined, tangents)
     follow_ends(points, beams, origin, joined, sweep, tangents)
-    count = _cleared(points, beams, origin, joined, tangents)
+    count = _cleared(points, beams, origin, joined, tangents, facings)
     face(points[:count], origin, joined, facings)
     for k in range(count):
         covariances[k, 0], covariances[k, 1], covariances[k, 2] = variance, 0.0, variance

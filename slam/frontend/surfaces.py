@@ -227,7 +227,7 @@ def unmixed(
     beams: NDArray[np.int64],
     origin: NDArray[np.float64],
     joined: NDArray[np.bool_],
-    out: NDArray[np.bool_],
+    out: NDArray[np.uint8],
 ) -> int:
     """Mark the hits that are no mixed pixel, and count them.
 

@@ -9,7 +9,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 from slam.frontend.polar import BEARING_OFF, bearing
 
 
@@ -74,6 +74,7 @@ def _emptied(  # noqa: PLR0913 (kernel)
     ages: NDArray[np.float64],
     of: Asking,
     recent: int,
+    turns: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> int:
     """Age of the newest scan that saw the place of each point (robot frame) empty, else inf.
@@ -81,12 +82,11 @@ def _emptied(  # noqa: PLR0913 (kernel)
     Returns the number of points whose places any of them had in view.
 
     lasers  (J, 3) in the map, ``limits`` (J, bins) free ranges as in ``View``, newest first, of
-    which the first few, ``recent``, are asked
+    which the first few, ``recent``, are asked; ``turns``: room for their cosines and sines
     """
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    cosines, sines = np.empty(recent), np.empty(recent)
     for j in range(recent):
-        cosines[j], sines[j] = math.cos(lasers[j, 2]), math.sin(lasers[j, 2])
+        turns[2 * j], turns[2 * j + 1] = math.cos(lasers[j, 2]), math.sin(lasers[j, 2])
     in_view = 0
     for k in range(len(points)):
         x = c * points[k, 0] - s * points[k, 1] + pose[0]
@@ -94,7 +94,8 @@ def _emptied(  # noqa: PLR0913 (kernel)
         out[k], seen = math.inf, False
         for j in range(recent):
             dx, dy = x - lasers[j, 0], y - lasers[j, 1]
-            u, v = cosines[j] * dx + sines[j] * dy, cosines[j] * dy - sines[j] * dx
+            cosine, sine = turns[2 * j], turns[2 * j + 1]
+            u, v = cosine * dx + sine * dy, cosine * dy - sine * dx
             seen = seen or _in_view(limits[j], of, u, v)
             if _passed(limits[j], of, u, v):
                 out[k] = ages[j]
@@ -168,20 +169,21 @@ def _left(  # noqa: PLR0913 (kernel)
 
 
 @inner
-def _along(
+def _along(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     joined: NDArray[np.bool_],
     votes: NDArray[np.float64],
     reach: float,
     thin: float,
+    before: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
     """Mean of ``votes`` along the surface of each point, up to ``reach`` m each way.
 
     1 where that stretch is shorter than ``thin`` m: earlier beams may have gone by such a thing.
+    ``before`` (n + 1,): room for the sums of the votes before each point.
     """
     n = len(points)
-    before = np.empty(n + 1)  # sums of the votes before each point
     before[0] = 0.0
     for k in range(n):
         before[k + 1] = before[k] + votes[k]
@@ -206,7 +208,7 @@ def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
     return math.sqrt(dx * dx + dy * dy)
 
 
-@njit
+@uncounted
 def votes(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     joined: NDArray[np.bool_],
@@ -221,6 +223,8 @@ def votes(  # noqa: PLR0913 (kernel)
     before: NDArray[np.float64],
     ends: NDArray[np.int64],
     of: Asking,
+    scratch: NDArray[np.float64],
+    bins: NDArray[np.int64],
     out: NDArray[np.float64],
 ) -> float:
     """Fill ``out`` (n,) with the vote of each of the points (robot frame), see ``Standing``.
@@ -230,10 +234,11 @@ def votes(  # noqa: PLR0913 (kernel)
     limit   (bins,) free ranges of the present scan, seen from ``T_map_laser``
     lasers, limits, ages, recent  of the scans asked, see ``_emptied``
     before  (m, 2) points in the map of those whose things may have left; ends (L,) of each scan's
+    scratch (4, at least n + 1 and 2 J), bins (2, bins): room to work in
     """
-    stood = np.empty(len(points))
-    in_view = _emptied(points, pose, lasers, limits, ages, of, recent, stood)
-    first, last = np.empty(len(limit), np.int64), np.empty(len(limit), np.int64)
+    n = len(points)
+    stood, own, first, last = scratch[0], scratch[1], bins[0], bins[1]
+    in_view = _emptied(points, pose, lasers, limits, ages, of, recent, scratch[2], stood)
     _indexed(points, T_robot_laser, of.step, first, last)
     start = 0
     for j in range(len(ends)):
@@ -242,9 +247,8 @@ def votes(  # noqa: PLR0913 (kernel)
             first, last, stood,
         )  # fmt: skip
         start = ends[j]
-    own = np.empty(len(points))
-    for k in range(len(points)):
+    for k in range(n):
         ratio = of.settled_s / max(stood[k], 1e-300)
         own[k] = 1.0 - of.sure * (1.0 - 1.0 / (1.0 + ratio * ratio))
-    _along(points, joined, own, of.along_m, of.thin_m, out)
-    return in_view / len(points)
+    _along(points, joined, own, of.along_m, of.thin_m, scratch[3], out)
+    return in_view / n

@@ -116,14 +116,16 @@ class Standing:
         )
         newest = sum(age <= config.left_s for age in ages)
         lately = [look.points_map for look in asked[:newest]]
+        limit, width = seen.view.limit, max(len(points) + 1, 2 * len(asked))
         out = np.empty(len(points))
         in_view = votes(
-            points, seen.joined, seen.view.limit, T_map_robot,
+            points, seen.joined, limit, T_map_robot,
             se2.compose(T_map_robot, seen.T_robot_laser), seen.T_robot_laser,
             np.array([look.T_map_laser for look in asked]),
             np.array([look.limit for look in asked]), np.array(ages),
             sum(age <= config.came_s for age in ages),
             np.concatenate(lately) if lately else NO_POINTS,
-            np.array(list(accumulate(map(len, lately))), np.int64), asking, out,
+            np.array(list(accumulate(map(len, lately))), np.int64), asking,
+            np.empty((4, width)), np.empty((2, len(limit)), np.int64), out,
         )  # fmt: skip
         return seen.with_votes(out, in_view)

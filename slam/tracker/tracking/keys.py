@@ -108,12 +108,15 @@ class KeyFrames:
         """Only the key frames that are left; a step is from the one before among them."""
         keys = merge.rows(self.keys)
         for at, before, k in zip(range(1, len(keys)), merge.left, merge.left[1:], strict=False):
-            step, covariance = self.keys[before + 1].step, self.keys[before + 1].covariance
-            for key in self.keys[before + 2 : k + 1]:
+            if k == before + 1:
+                continue
+            step, covariance, gone = np.zeros(3), np.zeros((3, 3)), self.keys[before + 1 : k + 1]
+            for key in gone:
                 own = key.covariance - self.slack
                 covariance = se2.propagate(covariance, step, key.step, own)
                 step = se2.compose(step, key.step)
-            keys[at] = replace(keys[at], step=step, covariance=covariance)
+            found, covariance = any(key.found for key in gone), covariance + self.slack
+            keys[at] = replace(keys[at], step=step, covariance=covariance, found=found)
         into = [*merge.into.tolist(), *range(len(merge.left), len(keys))]
         self._stand = [into[k] for k in self._stand]
         self._squares = merge.rows(self._squares)

@@ -15,12 +15,11 @@ from collections.abc import Callable
 from dataclasses import replace
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Float
 from slam.frontend.odometry_prior import inverted
-from slam.posegraph import Edge, Relaxation, carried, least_moved, relative
+from slam.posegraph import Edge, Relaxation, carried, least_moved
 from slam.tracker.belief.places import coarse, spread
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
@@ -30,8 +29,9 @@ from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.merging import LEFT, MOST_KEYS, Merge
 from slam.tracker.tracking.passages import Passages
-from slam.tracker.tracking.redraw import Correction, Redrawing
+from slam.tracker.tracking.redraw import Correction, Redrawing, torn_pairs
 
+RARE_S = 0.3  # s between frames in the mean, from which on each gets all work; set by hand
 _log = logging.getLogger(__name__)
 
 
@@ -85,14 +85,15 @@ class Loops(KeyFrames):
     @property
     def edges(self) -> list[Edge]:
         """Loops found so far."""
-        return list(self._edges.values())
+        return [*self._edges.values()]
 
     def work(self) -> None:
-        """Up to ``LoopsConfig.work`` units, and what the last task takes beyond."""
+        """Up to ``LoopsConfig.work`` units, fewer where frames come often, and the last task's rest."""
         if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
-        spent = 0
-        while spent < self._numbers.work:
+        share = self.keys[-1].start_s / self.keys[-1].frame / RARE_S
+        spent, most = 0, self._numbers.work * min(max(share, 1.0 / 3.0), 1.0)
+        while spent < most:
             cost = self._task()
             if cost == 0:
                 break
@@ -177,7 +178,7 @@ class Loops(KeyFrames):
             self._searched += 1
             return 1 + self.closures.spent
         solve = self._fresh and (self._surprised or self._fresh >= self._numbers.batch)
-        if solve or len(self.poses) > self._most:
+        if solve or self._too_many():
             self._relaxed = list(self._edges)
             self._relaxation = Relaxation(np.array(self.poses), self._chain + self.edges)
             return 1
@@ -272,28 +273,34 @@ class Loops(KeyFrames):
         if not relaxation.done:
             relaxation.round()
             return 1 + len(self.poses) // 64
-        weights = relaxation.weights[-len(self._relaxed) :].tolist()
+        weights = relaxation.weights[len(self._chain) :].tolist()
         self.weights = dict(zip(self._relaxed, weights, strict=True))
         self.poses = list(relaxation.poses)
         self._relaxation, self._surprised, self._fresh = None, False, 0
         self._weighed = self._new_graph = True
-        if len(self.poses) > self._most:
+        if self._too_many():
             self._merge()
         return 1
+
+    def _too_many(self) -> bool:
+        """Whether key frames are to be merged; not while some are drawn."""
+        return len(self.poses) > self._most and self._redrawing is None
 
     def _merge(self) -> None:
         """Let older key frames stand for those that are tied near them."""
         graph, numbers = np.array(self.poses), self._numbers
-        merge = Merge.of(graph, self._may_go(), numbers.key_m, numbers.key_rad)
+        held = {pair for pair, weight in self.weights.items() if weight > 0.5}
+        tied = {b for a, b in held & self._edges.keys() - self._links}
+        merge = Merge.of(graph, tied, self._searched, numbers)
         self._most = max(MOST_KEYS, round(len(merge.left) / LEFT))
         loose = spread(numbers.loop_m, numbers.loop_rad)
-        links = merge.joined([self._edges[pair] for pair in sorted(self._links)], graph, loose)
+        links = [self._edges[pair] for pair in sorted(self._links & self._edges.keys())]
+        links = merge.joined(links, graph, loose)
         self._chain = merge.joined(self._chain, graph, loose)
         stay = {pair: new for pair in self._edges if (new := merge.pair(pair))}
         found = [edge for pair, edge in self._edges.items() if pair not in self._links]
         self._edges = {(edge.a, edge.b): edge for edge in links + merge.those(found)}
-        self._links = {(edge.a, edge.b) for edge in links}
-        self._pending = merge.those(self._pending)
+        self._links, self._pending = {(e.a, e.b) for e in links}, merge.those(self._pending)
         self.weights = {stay[pair]: weight for pair, weight in self.weights.items() if pair in stay}
         self._rough = {stay[pair][1]: stay[pair] for pair in self._rough.values() if pair in stay}
         self._tied_to = {k for old in self._tied_to if (k := merge.number(old)) is not None}
@@ -305,21 +312,11 @@ class Loops(KeyFrames):
         self.leave(merge)
         self.closures.restart(self.poses)
 
-    def _may_go(self) -> NDArray[np.bool_]:
-        """(n,) key frames near one with a closure that holds, up to the last few."""
-        near, last = self._numbers.every, self._numbers.recent + 2 * self._numbers.submap
-        tied = np.zeros(min(self._searched, len(self.poses) - last), np.bool_)
-        for pair, weight in self.weights.items():
-            if weight > 0.5 and pair in self._edges and pair not in self._links:
-                tied[max(pair[1] - near, 1) : pair[1] + near + 1] = True
-        return tied
-
     def _follow(self) -> None:
         """Begin a new map if the graph denies places of the present one."""
         self._new_graph = False
-        if self._new_map is None or self._redrawing is not None:
-            return
-        if self.way_m < self._numbers.long_m:
+        short = self.way_m < self._numbers.long_m
+        if self._new_map is None or self._redrawing is not None or short:
             return
         torn = self._torn_keys(0.0)
         if not torn or not self._holds_present():
@@ -357,16 +354,10 @@ class Loops(KeyFrames):
         near_by = [(k - near, k) for k in range(near, last)
                    if self._passages.way(k - near, k) <= self._numbers.after_m]  # fmt: skip
         pairs = np.array(held + near_by)
-        torn = set(pairs[self._torn(pairs, online, np.array(self.poses)), 1].tolist())
+        torn = set(
+            pairs[torn_pairs(self._numbers, pairs, online, np.array(self.poses)), 1].tolist()
+        )
         return len(torn) if len(torn) >= self._numbers.denying else 0
-
-    def _torn(self, pairs: NDArray[np.int64], online: Float, graph: Float) -> NDArray[np.bool_]:
-        """Whether pairs (n, 2) of key frames lie otherwise in the map than in the graph."""
-        a, b = pairs[:, 0], pairs[:, 1]
-        off = relative(online[a], online[b]) - relative(graph[a], graph[b])
-        far = off[:, 0] ** 2 + off[:, 1] ** 2 > self._numbers.apply_m**2
-        turned = np.abs(se2.wrap_array(off[:, 2])) > self._numbers.apply_rad
-        return np.asarray(far | turned)
 
     def _tie(self, j: int) -> None:
         """Tie a key frame to all passages along there."""

@@ -20,6 +20,7 @@ from slam import se2
 from slam.frames import Float
 from slam.frontend.odometry_prior import inverted, turned
 from slam.posegraph import Edge
+from slam.tracker.tracking.config import LoopsConfig
 
 T = TypeVar("T")
 MOST_KEYS = 600  # key frames, from so many on they are merged; the logs have up to 522 (Intel)
@@ -40,14 +41,17 @@ class Merge:
         self.into = np.searchsorted(self.left, stand)
 
     @classmethod
-    def of(cls, poses: Float, tied: NDArray[np.bool_], key_m: float, key_rad: float) -> Merge:
-        """Those of ``poses`` (n, 3) that are ``tied`` go where an older one is so near.
+    def of(cls, poses: Float, tied: Iterable[int], searched: int, config: LoopsConfig) -> Merge:
+        """Key frames near one that is ``tied`` go where an older one is near; not the newest.
 
-        ``tied`` may be shorter: those beyond stay. Nearness is stretched where the area has too
-        many places.
+        poses     (n, 3) by the graph; so many of them were ``searched`` for closures
         """
+        may_go = np.zeros(min(searched, len(poses) - config.recent - 2 * config.submap), np.bool_)
+        for k in tied:
+            may_go[max(k - config.every, 1) : k + config.every + 1] = True
         for scale in SCALES:
-            merge = cls(_standing(poses, tied, scale * key_m, scale * key_rad))
+            near = scale * config.key_m, scale * config.key_rad
+            merge = cls(_standing(poses, np.flatnonzero(may_go).tolist(), *near))
             if len(merge.left) <= LEFT * MOST_KEYS:
                 break
         return merge
@@ -93,12 +97,10 @@ class Merge:
         return list(found.values())
 
 
-def _standing(
-    poses: Float, tied: NDArray[np.bool_], near_m: float, near_rad: float
-) -> NDArray[np.int64]:
+def _standing(poses: Float, may_go: list[int], near_m: float, near_rad: float) -> NDArray[np.int64]:
     """(n,) the key frame that stands for each of ``poses`` (n, 3): the nearest older one."""
     stand, left = np.arange(len(poses)), np.ones(len(poses), np.bool_)
-    for k in np.flatnonzero(tied).tolist():
+    for k in may_go:
         off = poses[:k] - poses[k]
         squares = off[:, 0] ** 2 + off[:, 1] ** 2
         near = left[:k] & (squares < near_m**2) & (np.abs(se2.wrap_array(off[:, 2])) < near_rad)

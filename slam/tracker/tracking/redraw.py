@@ -6,11 +6,16 @@ from __future__ import annotations
 from collections.abc import Callable
 from dataclasses import dataclass
 
+import numpy as np
+from numpy.typing import NDArray
+
 from slam import se2
 from slam.frames import Float
+from slam.posegraph import relative
 from slam.tracker.cell_map import CellMap
 from slam.tracker.map_config import MapConfig
 from slam.tracker.tracking.closures import draw
+from slam.tracker.tracking.config import LoopsConfig
 from slam.tracker.tracking.keys import KeyFrame
 
 
@@ -78,3 +83,14 @@ class Redrawing:
             max(following - key.start_s, self._config.resumed_look_s), self._config.longest_look_s
         )
         draw(self.cell_map, key, pose, max(look, self._config.first_look_s if k == 0 else 0.0))
+
+
+def torn_pairs(
+    config: LoopsConfig, pairs: NDArray[np.int64], online: Float, graph: Float
+) -> NDArray[np.bool_]:
+    """Whether pairs (n, 2) of key frames lie otherwise in the map than in the graph."""
+    a, b = pairs[:, 0], pairs[:, 1]
+    off = relative(online[a], online[b]) - relative(graph[a], graph[b])
+    far = off[:, 0] ** 2 + off[:, 1] ** 2 > config.apply_m**2
+    turned = np.abs(se2.wrap_array(off[:, 2])) > config.apply_rad
+    return np.asarray(far | turned)

@@ -77,6 +77,24 @@ def test_a_drifted_way_is_bent_back_onto_itself(drifted: Drifted) -> None:
     np.testing.assert_array_equal(graph.corrected(poses), corrected)
 
 
+def test_a_map_that_moved_off_its_start_says_so(drifted: Drifted) -> None:
+    """The map stays where most of it was: its first key frame moves, and that is known."""
+    _, truth, poses, _ = drifted
+    new = lambda: Network(CONFIG)  # noqa: E731
+    graph = filled(Loops(CONFIG, Matcher(CONFIG), new, new), drifted)
+    finish(graph)
+    correction = graph.correction(lambda: poses)
+    assert correction is not None
+    first, last = correction.poses[0], correction.poses[-1]
+    assert np.hypot(*first[:2]) > 0.05
+    error = graph.map_error(graph.keys[-1].frame)
+    assert error is not None
+    known = se2.between(first, last) - last  # where the way from the start says that it ends
+    assert known @ np.linalg.solve(error, known) <= 1.0
+    off = last - truth[-1]
+    assert off @ np.linalg.solve(error, off) < 11.3  # 3 numbers, 99 %
+
+
 def test_the_graph_does_not_depend_on_how_many_submaps_are_kept(
     drifted: Drifted, monkeypatch: pytest.MonkeyPatch
 ) -> None:
