@@ -286,6 +286,8 @@ _ALL = (
 # Since then, their tops found by scripts.benchmark.search on training seeds.
 _HALF_TURN = ((1, 1), (2, 2), (4, 3), (5, 4))  # boards, and people who walk with the robot
 _HALL = ((1, 5, 2), (3, 10, 4), (4, 15, 6), (6, 20, 8))  # people with it, past it; boards
+_ROUND = ((1, 0, 75), (1, 1, 60), (2, 1, 50), (2, 2, 40))  # doctors, visitors; s between times
+_CLEARED = ((1, 75), (2, 60), (3, 50), (4, 40))  # people, and s from one time to the next
 _HARD = (
     _ALL[3].later(
         test=FRESH, counts=True, says=_of("boards", 0, 3, 6, 9, 12),
@@ -320,6 +322,28 @@ _HARD = (
         sets=_each(
             motion=1.0, change=0.0, **_QUIET,
             crowd=("none", *(f"escorts:{a},streams:{b},boards:{c}" for a, b, c in _HALL)),
+        ),
+    ),
+    _ALL[8].later(
+        test=FRESH, scene="apartment", seconds=180.0, scanner=DEPTH_CAMERA, odometry=GOOD_ODOMETRY,
+        about="a depth camera among doctors and visitors, who carry the robot to other rooms",
+        axis="people, and s from one time to the next",
+        says=("0 people, never", *(f"{a + b} people, {at} s" for a, b, at in _ROUND)),
+        sets=_each(
+            motion=1.0, change=0.0, **_QUIET,
+            kidnap_every_s=(None, *(float(at) for *_, at in _ROUND)),
+            crowd=("none", *(f"escorts:{a},streams:{b}" for a, b, _ in _ROUND)),
+        ),
+    ),
+    _ALL[4].later(
+        test=FRESH, scene="apartment", seconds=180.0, scanner=DEPTH_CAMERA, odometry=GOOD_ODOMETRY,
+        about="a depth camera in a flat that is cleared: chairs roll, and the robot is carried",
+        axis="people who walk to and fro, share of 20 chairs on the move, and s between carries",
+        says=("0 people, 0 %, never", *(f"{n} people, {25 * n} %, {at} s" for n, at in _CLEARED)),
+        sets=_each(
+            motion=1.0, change=0.0, n_people=0, n_chairs=20, moving_share=LEVELS,
+            kidnap_every_s=(None, *(float(at) for _, at in _CLEARED)),
+            crowd=_crowds("streams", 0, 1, 2, 3, 4),
         ),
     ),
 )  # fmt: skip

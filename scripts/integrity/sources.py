@@ -24,7 +24,7 @@ from slam.logs import open_log
 from slam.shunting import ShuntingSlam
 
 TRACKS = (
-    "moving-day", "overnight", "warehouse-shift", "kidnapped-in-a-crowd", "moving-boards",
+    "moving-day-v1", "overnight", "warehouse-shift", "kidnapped-in-a-crowd", "moving-boards",
     "busy-chairs",
 )  # fmt: skip
 PLANES = ("chairs16", "pass6", "crowd6", "moved30", "wide270", "poor")

@@ -48,9 +48,11 @@ PUBLISHED = {  # what is published is added, and nothing here ever changes
     "half-turn-v1": "1b45f644f22c",
     "slow-boards-v1": "6718b8b49840",
     "depth-camera-v1": "010f48f6ed49",
+    "ward-round-v2": "3d5e9d83258c",
+    "moving-day-v2": "69ba2adae19a",
 }
 NOT_COUNTING = {"warehouse-shift-v1", "ward-round-v1", "kidnapped-in-a-crowd-v1"}
-OPEN: set[str] = set()
+OPEN = {"ward-round-v2", "moving-day-v2"}
 NOW = [track for track in newest().values() if track.world == WORLD]
 ONE = TRACKS["tour-guide-v1"]
 
