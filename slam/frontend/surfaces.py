@@ -112,10 +112,10 @@ def follow_ends(
 ) -> None:
     """Fill the tangents where a surface is no longer seen, but need not end.
 
-    An end is one only where the next valid beam sees past it, or where more than ``LOST_BEAMS``
-    have no valid return though they would meet the surface in range. Behind something nearer,
-    beyond the range or the last beam the surface may go on, and its last hit says nothing along it:
-    it moves with the robot.
+    An end is one only where the next valid beam, ``LOST_BEAMS`` on at most, sees past it, or where
+    there is none and the next beam would meet the surface in range. Behind something nearer, beyond
+    the range or the last beam the surface may go on, and its last hit says nothing along it: it
+    moves with the robot.
     ``sweep``: rad between beams, how many there are, and the range (m) of their use.
     """
     n = len(points)

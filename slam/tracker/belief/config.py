@@ -69,7 +69,7 @@ class BeliefConfig(Settings):
     slip_rad: float = number(0.2, "rad", "the same of its turn", low=1e-6)
     frozen_above: float = number(
         0.01, "probability", "that the pose is wrong: above, the map is not written", low=1e-9,
-        high=0.5,
+        high=0.05,
     )  # fmt: skip
     hopeless: float = number(20.0, "nats", "below the best: a place is followed no more")
 

@@ -88,7 +88,7 @@ class Loops(KeyFrames):
         return [*self._edges.values()]
 
     def work(self) -> None:
-        """Up to ``LoopsConfig.work`` units, fewer where frames come often, and the last task's rest."""
+        """Up to ``LoopsConfig.work`` units, fewer where frames come often; tasks are ended."""
         if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
         share = self.keys[-1].start_s / self.keys[-1].frame / RARE_S
@@ -228,16 +228,13 @@ class Loops(KeyFrames):
 
         The steps between are those of odometry; the map says where they led.
         """
-        known = j - 1
-        while known >= 0 and not self.keys[known].written:
-            known -= 1
+        known = next((k for k in range(j - 1, -1, -1) if self.keys[k].written), -1)
         if known < 0 or j - known == 1:
             return
         T_a_b = se2.between(self.keys[known].T_map_robot, self.keys[j].T_map_robot)
         information = inverted(coarse(self._relocalise))
-        self._edges[known, j] = Edge(
-            a=known, b=j, T_a_b=T_a_b, information=information, robust=True
-        )
+        edge = Edge(a=known, b=j, T_a_b=T_a_b, information=information, robust=True)
+        self._edges[known, j] = edge
         self._links.add((known, j))
         self._fresh, self._surprised = self._fresh + 1, True
 
@@ -277,21 +274,23 @@ class Loops(KeyFrames):
         self.weights = dict(zip(self._relaxed, weights, strict=True))
         self.poses = list(relaxation.poses)
         self._relaxation, self._surprised, self._fresh = None, False, 0
-        self._weighed = self._new_graph = True
+        self._weighed = self._new_graph = bool(self._relaxed)
         if self._too_many():
             self._merge()
         return 1
 
     def _too_many(self) -> bool:
-        """Whether key frames are to be merged; not while some are drawn."""
-        return len(self.poses) > self._most and self._redrawing is None
+        """Whether key frames are to be merged: what is left of a correction then is the map's."""
+        many = len(self.poses) > self._most and self._redrawing is None
+        return many and self._new_map is not None and not self._torn_keys(0.0)
 
     def _merge(self) -> None:
         """Let older key frames stand for those that are tied near them."""
         graph, numbers = np.array(self.poses), self._numbers
         held = {pair for pair, weight in self.weights.items() if weight > 0.5}
         tied = {b for a, b in held & self._edges.keys() - self._links}
-        merge = Merge.of(graph, tied, self._searched, numbers)
+        written = np.array([key.written for key in self.keys[: len(graph)]])
+        merge = Merge.of(graph, written, tied, self._searched, numbers)
         self._most = max(MOST_KEYS, round(len(merge.left) / LEFT))
         loose = spread(numbers.loop_m, numbers.loop_rad)
         links = [self._edges[pair] for pair in sorted(self._links & self._edges.keys())]
@@ -302,7 +301,8 @@ class Loops(KeyFrames):
         self._edges = {(edge.a, edge.b): edge for edge in links + merge.those(found)}
         self._links, self._pending = {(e.a, e.b) for e in links}, merge.those(self._pending)
         self.weights = {stay[pair]: weight for pair, weight in self.weights.items() if pair in stay}
-        self._rough = {stay[pair][1]: stay[pair] for pair in self._rough.values() if pair in stay}
+        rough = (merge.pair(pair) for pair in self._rough.values())
+        self._rough = {pair[1]: pair for pair in rough if pair}
         self._tied_to = {k for old in self._tied_to if (k := merge.number(old)) is not None}
         self._ties = deque(k for old in self._ties if (k := merge.number(old)) is not None)
         self._later = deque(pair for old in self._later if (pair := merge.pair(old)))

@@ -25,7 +25,7 @@ from slam.tracker.tracking.config import LoopsConfig
 T = TypeVar("T")
 MOST_KEYS = 600  # key frames, from so many on they are merged; the logs have up to 522 (Intel)
 LEFT = 0.75  # share of the key frames that may be left; set by hand
-SCALES = (1.0, 1.5, 2.0, 3.0)  # times key_m and key_rad: the first that leaves so few; set by hand
+SCALES = (1.0, 1.5, 2.0, 3.0)  # times key_m: the first that leaves so few; set by hand
 
 
 class Merge:
@@ -41,17 +41,25 @@ class Merge:
         self.into = np.searchsorted(self.left, stand)
 
     @classmethod
-    def of(cls, poses: Float, tied: Iterable[int], searched: int, config: LoopsConfig) -> Merge:
+    def of(
+        cls,
+        poses: Float,
+        written: NDArray[np.bool_],
+        tied: Iterable[int],
+        searched: int,
+        config: LoopsConfig,
+    ) -> Merge:
         """Key frames near one that is ``tied`` go where an older one is near; not the newest.
 
-        poses     (n, 3) by the graph; so many of them were ``searched`` for closures
+        poses    (n, 3) by the graph; so many of them were ``searched`` for closures
+        written  (n,) whether the map took them in: none else stands for others
         """
         may_go = np.zeros(min(searched, len(poses) - config.recent - 2 * config.submap), np.bool_)
         for k in tied:
             may_go[max(k - config.every, 1) : k + config.every + 1] = True
         for scale in SCALES:
-            near = scale * config.key_m, scale * config.key_rad
-            merge = cls(_standing(poses, np.flatnonzero(may_go).tolist(), *near))
+            near = scale * config.key_m, config.key_rad
+            merge = cls(_standing(poses, written, np.flatnonzero(may_go).tolist(), *near))
             if len(merge.left) <= LEFT * MOST_KEYS:
                 break
         return merge
@@ -85,11 +93,13 @@ class Merge:
         found: dict[tuple[int, int], Edge] = {}
         for edge in edges:
             a, b = sorted((int(self.into[edge.a]), int(self.into[edge.b])))
+            if a == b:
+                continue
             first, last = self.left[a], self.left[b]
             new = int(first not in (edge.a, edge.b)) + int(last not in (edge.a, edge.b))
             if new == 0:
                 found[a, b] = replace(edge, a=a, b=b)
-            elif a != b and (a, b) not in found:
+            elif (a, b) not in found:
                 turn = float(graph[edge.a, 2] - graph[first, 2])
                 covariance = turned(inverted(edge.information), turn) + new * loose
                 T_a_b = se2.between(graph[first], graph[last])
@@ -97,9 +107,11 @@ class Merge:
         return list(found.values())
 
 
-def _standing(poses: Float, may_go: list[int], near_m: float, near_rad: float) -> NDArray[np.int64]:
+def _standing(
+    poses: Float, written: NDArray[np.bool_], may_go: list[int], near_m: float, near_rad: float
+) -> NDArray[np.int64]:
     """(n,) the key frame that stands for each of ``poses`` (n, 3): the nearest older one."""
-    stand, left = np.arange(len(poses)), np.ones(len(poses), np.bool_)
+    stand, left = np.arange(len(poses)), written.copy()
     for k in may_go:
         off = poses[:k] - poses[k]
         squares = off[:, 0] ** 2 + off[:, 1] ** 2

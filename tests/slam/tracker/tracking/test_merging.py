@@ -33,12 +33,16 @@ def chain(poses: np.ndarray) -> list[Edge]:
     ]
 
 
+def written(poses: np.ndarray) -> np.ndarray:
+    return np.ones(len(poses), np.bool_)
+
+
 def test_a_way_that_was_driven_before_adds_no_key_frames() -> None:
     config = ShuntingConfig().loops
     few = config.recent + 2 * config.submap
     for rounds in (2, 5):
         poses = ring(rounds)
-        merge = Merge.of(poses, range(ONCE, len(poses)), len(poses), config)
+        merge = Merge.of(poses, written(poses), range(ONCE, len(poses)), len(poses), config)
         assert len(merge.left) <= ONCE + few
         off = poses[merge.left[merge.into]] - poses
         assert np.hypot(off[:, 0], off[:, 1]).max() < config.key_m
@@ -47,15 +51,20 @@ def test_a_way_that_was_driven_before_adds_no_key_frames() -> None:
 
 def test_what_no_closure_holds_stays() -> None:
     poses, config = ring(2), ShuntingConfig().loops
-    assert len(Merge.of(poses, [], len(poses), config).left) == len(poses)
-    searched = Merge.of(poses, range(ONCE, len(poses)), ONCE + 10, config)
+    assert len(Merge.of(poses, written(poses), [], len(poses), config).left) == len(poses)
+    unwritten = Merge.of(
+        poses, ~written(poses), range(ONCE, len(poses)), len(poses), config
+    )  # no map holds what they would stand for
+    assert len(unwritten.left) == len(poses)
+    searched = Merge.of(poses, written(poses), range(ONCE, len(poses)), ONCE + 10, config)
     assert set(range(ONCE + 10, len(poses))) <= set(searched.left.tolist())
 
 
 def test_the_graph_that_is_left_holds_together_where_it_was() -> None:
     """Each key frame is joined to the first, and least squares move none."""
     poses = ring(3)
-    merge = Merge.of(poses, range(ONCE, len(poses)), len(poses), ShuntingConfig().loops)
+    config = ShuntingConfig().loops
+    merge = Merge.of(poses, written(poses), range(ONCE, len(poses)), len(poses), config)
     edges = merge.joined(chain(poses), poses, LOOSE)
     left = poses[merge.left]
     reached = {0}
@@ -76,6 +85,17 @@ def test_numbers_of_pairs_and_rows() -> None:
     assert merge.pair((3, 6)) == (2, 4)
     assert merge.pair((2, 3)) is None
     assert merge.rows("abcdefg") == ["a", "b", "d", "f", "g"]
+
+
+def test_a_map_that_is_not_moved_keeps_all_key_frames(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Else past poses would lose the corrections that only their own key frames have."""
+    monkeypatch.setattr(loops, "MOST_KEYS", 10)
+    drive = Drive(office_loop().start, office_loop().pieces)
+    stream = frames(World2D(office()), drive, rate_hz=1.0, spec=laser(181), seed=4)
+    slam = ShuntingSlam({"cell_m": 0.05, "loops.long_m": 20.0, "loops.corrects": 0})
+    for frame in stream:
+        slam.update(frame.without_truth())
+    assert slam._loops._stand == list(range(len(slam._loops.keys)))
 
 
 def test_round_and_round_the_graph_stops_growing(monkeypatch: pytest.MonkeyPatch) -> None:
