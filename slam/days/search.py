@@ -29,6 +29,7 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
+from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse, spread
 from slam.tracker.belief.posterior import Odds, probabilities
@@ -44,7 +45,6 @@ BUFFER = 200  # scans, kept to be merged when the place is found
 BUFFER_M, BUFFER_RAD = 0.1, 0.15  # m driven or rad turned between two of them
 ASKED = 20  # scans of those kept, evenly taken, that a place found late is asked for
 AGREED = 0.75  # share of the usual match, in a map without days, of those asked
-ASKED_AGAIN = 10.0  # times belief.frozen_above that may be left: whether it fits is asked, too
 FITS = 0.5  # share of the scans after the find that must be tracked
 # Whether a session fits the days before; set by hand.
 ALWAYS = 0.7  # share of the looks of all sessions: always stands
@@ -271,7 +271,7 @@ class StartSearch:
             del self._hopeless[:-BUFFER]
 
     def _weight(self, place: Place) -> float:
-        """Nats of having begun there, against outside the map; any place of it is as likely."""
+        """Nats of having begun there, against outside the map; as of any place that is found."""
         return self._odds.evidence(place.evidence) + self._prior
 
     def starts(self) -> list[Start]:
@@ -289,7 +289,7 @@ class StartSearch:
         """T_map_own (3,), where one place is certain, and no other is still to be asked."""
         if self._late or not self._places.searches:
             return None
-        sure = 1.0 - ASKED_AGAIN * self._belief.frozen_above
+        sure = 1.0 - LENIENT * self._belief.frozen_above  # whether it fits is asked, too
         for place, start in zip(self._places.followed, self.starts(), strict=True):
             if place.waited == 0 and start.probability >= sure:
                 return start.T_map_own if self._fits(start.T_map_own) else None

@@ -20,6 +20,7 @@ from slam.frames import Float
 from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
+from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.episode import Episode, second_moment
 from slam.tracker.belief.places import Place, spread
 from slam.tracker.belief.posterior import Odds, probabilities
@@ -325,7 +326,7 @@ class Belief:
     ) -> Judged:
         """Whether one place is certain: where motion led, or another; else wait."""
         weighed, waited_enough = self._weighed, episode.elapsed_s > self._give_up_s
-        sure = 1.0 - self._config.frozen_above * (10.0 if waited_enough else 1.0)
+        sure = 1.0 - self._config.frozen_above * (LENIENT if waited_enough else 1.0)
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = _same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks

@@ -280,7 +280,7 @@ class Loops(KeyFrames):
         return 1
 
     def _too_many(self) -> bool:
-        """Whether key frames are to be merged: what is left of a correction then is the map's."""
+        """Whether key frames are to be merged; in a torn map their corrections would be lost."""
         many = len(self.poses) > self._most and self._redrawing is None
         return many and self._new_map is not None and not self._torn_keys(0.0)
 
