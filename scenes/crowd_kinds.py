@@ -103,13 +103,11 @@ class Filling:
             self.add(kind, name, pose)
 
     def finish(self) -> Scene:
-        """A copy of the scene with all that was put into it."""
+        """The scene with all that was put into it; its spec is filled, which saves a copy."""
         scene = self.scene
-        spec = scene.spec.copy()
-        self.parts.into(spec)
+        self.parts.into(scene.spec)
         return replace(
             scene,
-            spec=spec,
             movers=(*scene.movers[:-1], *self.movers, scene.movers[-1]),
             initial={**scene.initial, **self.initial},
             roles=dict(self.roles),
@@ -166,7 +164,7 @@ COAT = "person_coat"  # what accompanies the robot is dressed for a tour in wint
 def with_crowd(
     scene: Scene, crowd: Crowd, session: int = 0, *, as_many_as_fit: bool = False
 ) -> Scene:
-    """The scene with a crowd in it, another one each session; the given scene is left as it is.
+    """The scene with a crowd in it, another one each session; the given scene is used up.
 
     Raises ``InvalidValueError`` where it does not fit on the floor, unless ``as_many_as_fit`` will
     do: of each kind up to the first that has no room.

@@ -294,7 +294,8 @@ def opened(
     time = time_of(checked(session))
     if not isinstance(scene, str):
         instance("scene", scene, Scene)
-        return Days(scene, seeds, change).arranged(scene, session), seeds_of(seeds, session)
+        own = replace(scene, spec=scene.spec.copy())  # a crowd may be put into it
+        return Days(own, seeds, change).arranged(own, session), seeds_of(seeds, session)
     whole = build(scene, seed=seeds.integer("layout"), **options)
     days, people = Days(whole, seeds, change), _people(whole)
     present = math.floor(time.present * people + 0.5)
