@@ -240,12 +240,11 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """``frame_skip`` scans under the given command, fewer where the episode ends."""
-        observation, reward, terminated, truncated = self.act(action)
+        observation, reward, terminated, truncated = self.act(*clipped(action))
         return observation, reward, terminated, truncated, self._info()
 
-    def act(self, action: NDArray[np.float32]) -> tuple[Observation, float, bool, bool]:
-        """``step`` without the info."""
-        v, omega = clipped(action)
+    def act(self, v: float, omega: float) -> tuple[Observation, float, bool, bool]:
+        """``step`` of a command in [-1, 1], without the info."""
         world, task = self.simulation.world, self._task
         start_ns = world.time_ns
         world.set_command(v * V_MAX_MPS, omega * OMEGA_MAX_RADPS)

@@ -11,8 +11,9 @@ depend on it.
 
 from __future__ import annotations
 
-from collections.abc import Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor
+import math
+from collections.abc import Callable, Mapping, Sequence
+from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
@@ -28,7 +29,10 @@ from slam.errors import InvalidValueError
 
 MOST_ENVS = 4096  # each holds a physics model of its own
 MOST_THREADS = 1024
-Outcome = tuple[float, bool, bool]
+TOLD: dict[str, Any] = {  # shape and type of what the infos tell of a room
+    "pose": ((3,), np.float64), "goal": ((2,), np.float64), "goal_distance": ((), np.float64),
+    "hard_collision": ((), np.bool_), "is_success": ((), np.bool_),
+}  # fmt: skip
 
 
 class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
@@ -86,8 +90,12 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         self.action_space = batch_space(self.single_action_space, num_envs)
         zero = self.single_observation_space.sample()
         self._seen = {k: np.zeros((num_envs, *v.shape), v.dtype) for k, v in zero.items()}
-        self._ended = np.zeros(num_envs, dtype=np.bool_)
-        self._pool = ThreadPoolExecutor(n_threads) if n_threads > 1 else None
+        self._told = {k: np.zeros((num_envs, *s), kind) for k, (s, kind) in TOLD.items()}
+        if frames:
+            self._told["frame"] = np.empty(num_envs, dtype=object)
+        self._ended: NDArray[np.bool_] = np.zeros(num_envs, dtype=np.bool_)
+        self._helpers = min(n_threads, num_envs) - 1
+        self._pool = ThreadPoolExecutor(self._helpers) if self._helpers else None
 
     def reset(
         self,
@@ -107,11 +115,25 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
                 f"option reset_mask must be ({self.num_envs},) bool with one true, got {mask!r}"
             )
         seeds = self._seeds(seed)
-        chosen = np.flatnonzero(mask).tolist()
-        run = map if self._pool is None else self._pool.map
-        list(run(lambda i: self._restart(i, seeds[i], own), chosen))
+        self._each(lambda i: self._restart(i, seeds[i], own), np.flatnonzero(mask).tolist())
         self._ended[mask] = False
-        return self._observations(), self._infos()
+        return _copied(self._seen), self._infos()
+
+    def _each(self, work: Callable[[int], None], rooms: Sequence[int]) -> None:
+        """``work`` of every room, on all threads: whichever is free takes the next."""
+        left = iter(rooms)  # one thread at a time has the interpreter's lock, and so its ``next``
+
+        def some() -> None:
+            for i in left:
+                work(i)
+
+        others = [self._pool.submit(some) for _ in range(self._helpers)] if self._pool else []
+        try:
+            some()
+        finally:
+            wait(others)
+        for other in others:
+            other.result()
 
     def _seeds(self, seed: Any) -> list[int | None]:
         """One for each room."""
@@ -124,16 +146,25 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
 
     def _restart(self, i: int, seed: int | None, options: dict[str, Any] | None) -> None:
         observation, _ = self.envs[i].reset(seed=seed, options=options)
-        self._keep(i, observation)
-
-    def _keep(self, i: int, observation: Observation) -> None:
         for name, stacked in self._seen.items():
             if observation[name].shape != stacked[i].shape:
                 raise InvalidValueError(
                     f"observation '{name}' has shape {observation[name].shape}, the others "
                     f"{stacked[i].shape}: set the laser when making the environments"
                 )
+        self._keep(i, observation)
+
+    def _keep(self, i: int, observation: Observation) -> None:
+        for name, stacked in self._seen.items():
             stacked[i] = observation[name]
+        env, told = self.envs[i], self._told
+        told["pose"][i] = env.simulation.world.robot_pose()
+        told["goal"][i] = env.goal or math.nan
+        told["goal_distance"][i] = math.nan if env.goal is None else env.goal_distance
+        told["hard_collision"][i] = any(contact.hard for contact in env.contacts)
+        told["is_success"][i] = env.is_success
+        if self._frames:
+            told["frame"][i] = env.simulation.frame
 
     def step(
         self, actions: NDArray[np.float32]
@@ -145,62 +176,48 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         Actions as in the single environment: finite ones are clipped, anything else is refused with
         ``InvalidValueError`` before any room moves. ``ResetNeededError`` before the first reset.
         """
-        commands = of_rooms(actions, self.num_envs)
+        commands = np.clip(of_rooms(actions, self.num_envs), -1.0, 1.0).tolist()
         for env in self.envs:
             env.simulation  # noqa: B018  (raises where it was never reset)
         if self.mode == AutoresetMode.DISABLED and self._ended.any():
             raise ResetNeededError(f"reset first: {np.flatnonzero(self._ended)}")
-        rooms = range(self.num_envs)
-        if self._pool is None:
-            results = [self._one(i, commands[i]) for i in rooms]
-        else:
-            results = list(self._pool.map(self._one, rooms, commands))
-        rewards = np.array([r[0] for r in results], dtype=np.float64)
-        terminated = np.array([r[1] for r in results], dtype=np.bool_)
-        truncated = np.array([r[2] for r in results], dtype=np.bool_)
-        self._ended = terminated | truncated
-        final = None
-        if self.mode == AutoresetMode.SAME_STEP and self._ended.any():
-            final = self._start_over()
-        return self._observations(), rewards, terminated, truncated, self._infos(final)
+        rewards, ends = np.zeros(self.num_envs), np.zeros((2, self.num_envs), dtype=np.bool_)
+        last: dict[int, Any] = {}
 
-    def _one(self, i: int, action: NDArray[np.float32]) -> Outcome:
-        if self._ended[i] and self.mode == AutoresetMode.NEXT_STEP:
-            self._restart(i, None, None)
-            return 0.0, False, False
-        observation, reward, terminated, truncated = self.envs[i].act(action)
-        self._keep(i, observation)
-        return reward, terminated, truncated
+        def one(i: int) -> None:
+            if self._ended[i]:
+                self._restart(i, None, None)
+                return
+            observation, rewards[i], ends[0, i], ends[1, i] = self.envs[i].act(*commands[i])
+            self._keep(i, observation)
+            if self.mode == AutoresetMode.SAME_STEP and ends[:, i].any():
+                seen = {name: np.array(rows[i]) for name, rows in self._seen.items()}
+                last[i] = seen, {name: rows[[i]] for name, rows in self._told.items()}
+                self._restart(i, None, None)
 
-    def _start_over(self) -> dict[str, Any]:
-        """Reset the rooms that ended; the last observations of their old episodes."""
-        final, of_old = np.full(self.num_envs, None, dtype=object), self._infos()
-        for i in np.flatnonzero(self._ended).tolist():
-            final[i] = {name: np.array(stacked[i]) for name, stacked in self._seen.items()}
-            self._restart(i, None, None)
-        ended, self._ended = self._ended, np.zeros(self.num_envs, dtype=np.bool_)
+        self._each(one, np.argsort(~self._ended, kind="stable").tolist())  # what takes long, first
+        self._ended = ends[0] | ends[1]
+        final = {}
+        if self.mode == AutoresetMode.SAME_STEP:
+            final = self._final(last) if last else {}
+            self._ended = np.zeros(self.num_envs, dtype=np.bool_)
+        return _copied(self._seen), rewards, ends[0], ends[1], self._infos() | final
+
+    def _final(self, last: dict[int, Any]) -> dict[str, Any]:
+        """The last observations and infos of the rooms that ended and began anew."""
+        seen, infos = np.full(self.num_envs, None, dtype=object), self._infos()
+        for i, (observation, told) in last.items():
+            seen[i] = observation
+            for name, value in told.items():
+                infos[name][[i]] = value
         return {
-            "final_obs": final, "_final_obs": ended, "final_info": of_old, "_final_info": ended,
+            "final_obs": seen, "_final_obs": self._ended,
+            "final_info": infos, "_final_info": self._ended,
         }  # fmt: skip
 
-    def _observations(self) -> Observation:
-        return {name: stacked.copy() for name, stacked in self._seen.items()}
-
-    def _infos(self, final: dict[str, Any] | None = None) -> dict[str, Any]:
-        n, simulations = self.num_envs, [env.simulation for env in self.envs]
-        distances = [env.goal_distance for env in self.envs]
-        infos: dict[str, Any] = {
-            "pose": np.array([s.world.robot_pose() for s in simulations]),
-            "goal": np.array([env.goal or (np.nan, np.nan) for env in self.envs]),
-            "goal_distance": np.array([np.nan if d is None else d for d in distances]),
-            "hard_collision": np.array([any(c.hard for c in env.contacts) for env in self.envs]),
-            "is_success": np.array([env.is_success for env in self.envs]),
-        }
-        if self._frames:
-            infos["frame"] = np.empty(n, dtype=object)
-            infos["frame"][:] = [s.frame for s in simulations]
-        infos |= {f"_{name}": np.ones(n, dtype=np.bool_) for name in tuple(infos)}
-        return infos | (final or {})
+    def _infos(self) -> dict[str, Any]:
+        there = {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in self._told}
+        return _copied(self._told) | there
 
     def render(self) -> None:
         """None: pictures are left to the single environment."""
@@ -211,6 +228,10 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             self._pool.shutdown()
         for env in self.envs:
             env.close()
+
+
+def _copied(rows: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
+    return {name: stacked.copy() for name, stacked in rows.items()}
 
 
 def _mode(value: str | AutoresetMode) -> AutoresetMode:
