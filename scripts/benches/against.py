@@ -7,10 +7,17 @@ ours and a peer's take turns in blocks, and each pair of blocks gives one ratio.
 
 from __future__ import annotations
 
+import importlib
+import json
+import math
 import os
+import tempfile
 import time
 from collections.abc import Callable, Iterator
+from concurrent.futures import ThreadPoolExecutor
+from dataclasses import replace
 from functools import partial
+from pathlib import Path
 from typing import Any
 
 import mujoco
@@ -18,19 +25,25 @@ import numpy as np
 
 from scripts import marks, workers
 from scripts.benches.world import DYNAMISM, SEED, note_poses, timed
+from sim.gym.vector import MobiliaVectorEnv
+from sim.recording.episode import record
+from sim.recording.recipe import Recipe
 from sim.sensors.lidar.candidates import UNSEEN_GROUPS
 from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.lidar.models.lms221 import Lms221Config
-from sim.simulation import Simulation, n_frames, stream, tour
+from sim.simulation import stream
 from sim.world.world import World
+from slam._jit import njit
 from slam.errors import MissingDependencyError
+from slam.frames import LaserSpec
 from slam.system import create
 
 PAIRS = 15
 LOW, HIGH = 3, 11  # of the sorted ratios: the median lies between these, 96 %, whatever their law
 PEERS = ("kiss-icp", "small-gicp", "karto")
 COPIES = 2
-LOOP = 5_000_000
+LOOP = 50_000_000
+EPISODE = Recipe(scene="office", seed=SEED, dynamism=DYNAMISM, seconds=2.0)
 Row = dict[str, Any]
 Pairs = tuple[list[float], list[float]]  # of ours, of a peer
 
@@ -57,8 +70,9 @@ def in_turn(
 def rows(seconds: float) -> Iterator[Row]:
     """Scan, SLAM and processes; a peer that is not installed is left out."""
     yield from scans(max(10, round(2 * seconds)))
+    yield from others(max(10, round(2 * seconds)))
     yield from slams(seconds)
-    yield processes(seconds)
+    yield from at_once(seconds)
 
 
 def scans(count: int) -> Iterator[Row]:
@@ -76,6 +90,50 @@ def scans(count: int) -> Iterator[Row]:
         found = in_turn(ours, partial(bare_rays, world, laser, count))
         how = "361 ideal beams; the peer has one origin, no times, no labels"
         yield compared(f"scan, {name}: `mj_multiRay`", found, 1e6 / count, "µs", how)
+
+
+def others(count: int) -> Iterator[Row]:
+    """A scan of the arena against one by ir-sim among the same boxes, and movers as discs."""
+    try:
+        irsim = importlib.import_module("irsim")
+    except ImportError:
+        return
+    world = World("arena", seed=SEED, dynamism=DYNAMISM)
+    laser = LaserScanner(world.model, Lms221Config.ideal(), np.random.default_rng(0))
+    peer = ir_sim(irsim, world, laser.spec).robot_list[0]
+    state = np.array([world.robot_pose()]).T
+
+    def ours() -> None:
+        for _ in range(count):
+            note_poses(laser.begin(world.data), int(laser.window.marks[1:].sum()))
+            laser.finish()
+
+    found = in_turn(ours, lambda: [peer.lidar.step(state) for _ in range(count)])
+    how = "361 ideal beams among the same boxes and discs; the peer has no times, no labels"
+    yield compared("scan, arena: ir-sim", found, 1e6 / count, "µs", how)
+
+
+def ir_sim(irsim: Any, world: World, spec: LaserSpec) -> Any:
+    """The walls and furniture of a room as boxes in ir-sim, everything that moves as a disc."""
+    x, y, far_x, far_y = world.scene.bounds
+    *movers, _ = zip(world.mover_poses().tolist(), world.scene.movers, strict=True)
+    discs = [(pose, {"name": "circle", "radius": float(m.radius)}) for pose, m in movers]
+    boxes = [
+        ([x, y, yaw], {"name": "rectangle", "length": 2.0 * a, "width": 2.0 * b})
+        for x, y, a, b, yaw in world.scene.obstacles.tolist()
+    ]
+    sees = {"name": "lidar2d", "number": spec.n_beams, "range_max": spec.range_max,
+            "angle_range": math.pi, "offset": spec.T_robot_laser.tolist()}  # fmt: skip
+    robot = {"kinematics": {"name": "diff"}, "shape": {"name": "circle", "radius": 0.2},
+             "state": world.robot_pose().tolist(), "sensors": [sees]}  # fmt: skip
+    told = {
+        "world": {"width": far_x - x, "height": far_y - y, "offset": [x, y]}, "robot": [robot],
+        "obstacle": [{"state": state, "shape": shape} for state, shape in boxes + discs],
+    }  # fmt: skip
+    with tempfile.NamedTemporaryFile("w", suffix=".yaml") as file:
+        json.dump(told, file)  # which is YAML
+        file.flush()
+        return irsim.make(file.name, display=False, log_level="ERROR")
 
 
 def bare_rays(world: World, laser: LaserScanner, count: int) -> None:
@@ -114,36 +172,46 @@ def slams(seconds: float) -> Iterator[Row]:
         yield compared(f"SLAM: {name}", found, 1e3 / part, "ms", how)
 
 
-def processes(seconds: float) -> Row:
-    """What two processes get done more than one, by the wall: simulation, and a plain loop."""
-    simulated = max(seconds / PAIRS, 2.0)
+def at_once(seconds: float) -> Iterator[Row]:
+    """What two get done more than one, by the wall: episodes and rooms, and a plain loop beside."""
+    how = f"times what one does, by {COPIES}; what else runs on the machine counts"
+    loops, steps = ThreadPoolExecutor(COPIES), max(10, round(4 * seconds))
+    many = [MobiliaVectorEnv(8, n_threads=n, scene="arena", time_limit_s=1e6) for n in (1, COPIES)]
+    for rooms in many:
+        rooms.reset(seed=SEED)
 
-    def gain(work: Callable[[int], object]) -> float:
-        return COPIES * _wall(work, 1) / _wall(work, COPIES)
+    def stepped(threads: int) -> float:
+        rooms, still = many[threads - 1], np.zeros((8, 2), np.float32)
+        return wall(lambda: [rooms.step(still) for _ in range(threads * steps)])
 
-    found = in_turn(partial(_drive, simulated), _loop, gain)
-    how = f"times the work of one by {COPIES} processes; what else runs on the machine counts"
-    return compared("two processes: a plain loop", found, 1.0, "×", how)
+    def looped(copies: int) -> float:
+        return wall(lambda: list(loops.map(loop, [LOOP] * copies)))
+
+    with tempfile.TemporaryDirectory() as scratch:
+
+        def made(copies: int) -> float:
+            out = Path(tempfile.mkdtemp(dir=scratch))
+            jobs = [replace(EPISODE, seed=SEED + k) for k in range(copies)]
+            return wall(lambda: list(workers.each(partial(record, parent=out), jobs, jobs=copies)))
+
+        for what, work in (("two threads, 8 rooms", stepped), ("two processes, episodes", made)):
+            found = in_turn(work, looped, lambda each: COPIES * each(1) / each(COPIES))
+            yield compared(f"{what}: a plain loop", found, 1.0, "×", how)
 
 
-def _wall(work: Any, copies: int) -> float:
+def wall(work: Callable[[], object]) -> float:
+    """s."""
     start = time.perf_counter()
-    for _ in workers.each(work, list(range(copies)), jobs=copies):
-        pass
+    work()
     return time.perf_counter() - start
 
 
-def _drive(seconds: float, seed: int) -> None:
-    room = Simulation("office", seed=SEED + seed, dynamism=DYNAMISM)
-    frames = tour(room, seconds)
-    for _ in range(n_frames(seconds, room.scan_period_s)):
-        next(frames)
-
-
-def _loop(_: int) -> int:
-    total = 0
-    for k in range(LOOP):
-        total += k & 7
+@njit
+def loop(times: int) -> float:
+    """Additions one after the other, without the interpreter's lock."""
+    total = 0.0
+    for k in range(times):
+        total = 0.5 * total + k
     return total
 
 

@@ -1,20 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The rows of ``mobilia bench`` about datasets: making, reading, sizes, two processes."""
+"""The rows of ``mobilia bench`` about datasets: making, reading, sizes."""
 
 from __future__ import annotations
 
 import tempfile
 import time
 from collections.abc import Iterator
-from functools import partial
 from itertools import islice
 from pathlib import Path
 
-from scripts import workers
 from scripts.benches.world import Row, row
 from sim.moments import toured
 from sim.recording.bag import BagWriter
-from sim.recording.episode import record
 from sim.recording.recipe import Recipe
 from sim.simulation import Simulation, n_frames
 from slam.logs import read_bag
@@ -39,7 +36,6 @@ def rows(seconds: float, *, seed: int, dynamism: float) -> Iterator[Row]:
         for what, labels, target in (("", False, "≥ 8000"), (", with labels", True, "")):
             rate = _reading(bag, labels)
             yield row(f"bag, read{what}", rate, "frames/s", target, "into Frames")
-        yield row("two processes", _speed_up(recipe, folder), "×", "≥ 1.8", "against one, wall")
 
 
 def written(simulation: Simulation, seconds: float, folder: Path) -> tuple[float, float, Path]:
@@ -63,25 +59,3 @@ def _reading(bag: Path, labels: bool) -> float:
     started = time.process_time()
     count = sum(1 for _ in stream)
     return count / (time.process_time() - started)
-
-
-def _speed_up(recipe: Recipe, folder: Path) -> float:
-    """Wall time of four episodes on one process over that on two, both warm."""
-    spent = {}
-    for jobs in (1, 2):
-        for attempt in ("warm", "timed"):
-            out = folder / f"{jobs}-{attempt}"
-            out.mkdir()
-            seeds = range(recipe.seed, recipe.seed + 4)
-            recipes = [Recipe(scene="office", seed=s, dynamism=recipe.dynamism,
-                              seconds=1.0 if attempt == "warm" else recipe.seconds)
-                       for s in seeds]  # fmt: skip
-            started = time.perf_counter()
-            for _ in workers.each(partial(_one, out), recipes, jobs=jobs):
-                pass
-            spent[jobs] = time.perf_counter() - started
-    return spent[1] / spent[2]
-
-
-def _one(folder: Path, recipe: Recipe) -> None:
-    record(recipe, folder)

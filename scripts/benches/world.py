@@ -17,7 +17,6 @@ import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
 from sim.core.packed import packed
-from sim.gym.wrappers import goal_rooms
 from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.windows import note
@@ -33,7 +32,6 @@ SEED = 100
 DYNAMISM = 0.5
 REPEATS = 7
 N_ENVS = 4
-GOAL_ROOM: dict[str, Any] = {"terminate_on_collision": True, "time_limit_s": 30.0}
 Row = dict[str, Any]
 
 
@@ -170,29 +168,6 @@ def environments(seconds: float) -> Iterator[Row]:
         wanted = "≤ 50" if scene == "Office" else ""
         how = f"{scene.lower()}, every effect, another seed each time"
         yield row("env reset", float(np.median(resets)) * 1e3, "ms", wanted, how)
-
-
-def learning(seconds: float) -> Iterator[Row]:
-    """Steps as who learns sees them: goal rooms of four scans a step, resets among them."""
-    steps = max(20, round(10 * seconds / REPEATS))
-    for n, scans, target in ((1, "all", ""), (4, "last", ""), (16, "last", "≥ 400")):
-        rooms = goal_rooms("mobilia/ArenaGoal-v2", n, n_threads=1, scans=scans, **GOAL_ROOM)
-        rooms.reset(seed=SEED)
-        figure = n * steps / stepping(_Resetting(rooms), steps, n)
-        how = f"arena, 1/9.4 s a step, scans: {scans} of its four; with resets; no network"
-        yield row(f"learner's steps, goal rooms: {n}", figure, "1/s", target, how)
-
-
-class _Resetting:
-    """Rooms that begin again when they end, as those of a learner do."""
-
-    def __init__(self, rooms: Any) -> None:
-        self._rooms = rooms
-
-    def step(self, actions: Any) -> None:
-        _, _, terminated, truncated, _ = self._rooms.step(np.atleast_2d(actions))
-        if (ended := terminated | truncated).any():
-            self._rooms.reset(options={"reset_mask": ended})
 
 
 def stepping(room: Any, steps: int, n: int) -> float:

@@ -50,7 +50,6 @@ def bench(
         world.scanner,
         world.physics,
         world.environments,
-        world.learning,
         crowds.rows,
         world.pictures,
         bench_slam.updates,
