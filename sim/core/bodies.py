@@ -11,6 +11,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.footprint import at_rest
 from scenes.kinds import joint_of_door
 from sim.core.checks import numbers
 from sim.core.flow import box_clearance
@@ -81,13 +82,9 @@ class Bodies:
         self._qpos, self._dof = np.full(n, -1, dtype=np.int64), np.full(n, -1, dtype=np.int64)
         # doors: hinge x, y m; heading rad when closed; turn, and metres along the heading, by qpos
         self._hinge = np.zeros((n, 5))
-        data: mujoco.MjData | None = None
         for i, mover in enumerate(scene.movers):
             if mover.group == "door":
-                if data is None:
-                    data = mujoco.MjData(self.model)
-                    mujoco.mj_kinematics(self.model, data)
-                self._add_door(i, mover, data)
+                self._add_door(i, mover, at_rest(model))
             else:
                 self._add_planar(i, mover)
         self._robot_at = 0 if self.robot is None else int(self._qpos[self.robot])

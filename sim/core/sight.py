@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.footprint import HULL_GROUP, static_geoms
+from scenes.footprint import HULL_GROUP, at_rest, static_geoms
 from slam import se2
 from slam._jit import njit
 from slam.frames import LaserSpec
@@ -76,8 +76,7 @@ def opaque_boxes(model: mujoco.MjModel, height: float, panes: NDArray[np.bool_])
 
     panes  (ngeom,) True for glass
     """
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = at_rest(model)
     rows = []
     for geom in static_geoms(model).tolist():
         turn: Any = data.geom_xmat[geom]

@@ -15,6 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.footprint import at_rest
 from sim.sensors.lidar import columns as col
 from slam._jit import inner, njit
 from slam.errors import InvalidValueError
@@ -38,8 +39,7 @@ def candidates(
 
     Raises ``InvalidValueError`` for a mesh, height field or SDF that could meet the scan plane.
     """
-    data = mujoco.MjData(model)
-    mujoco.mj_kinematics(model, data)
+    data = at_rest(model)
     lifts, body, kind = _changes_height(model, data), model.geom_bodyid, model.geom_type
     bound = model.geom_rbound.copy()
     odd = ~np.isin(kind, col.PRIMITIVES)

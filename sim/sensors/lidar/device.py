@@ -17,6 +17,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.footprint import at_rest
 from sim.sensors.lidar.caster import Noted, Raycaster
 from sim.sensors.lidar.receiver import ScanResult, SignalModel
 from sim.sensors.lidar.registry import ScannerConfig, scanner_of
@@ -67,8 +68,7 @@ class LaserScanner:
         number = mujoco.mj_name2id(model, mujoco.mjtObj.mjOBJ_SITE, site)
         if number < 0:
             raise InvalidValueError(f"LaserScanner.site: the model has no site {site!r}")
-        data = mujoco.MjData(model)
-        mujoco.mj_kinematics(model, data)
+        data = at_rest(model)
         self.spec = scanner.spec(_mounting(model, data, number, robot))
         self.caster = Raycaster(
             model,
