@@ -6,16 +6,18 @@ from __future__ import annotations
 from typing import Any
 
 from scripts.figures import styled
-from scripts.paper.comparison import TABLE_3, below_printed, paper_table
 from scripts.paper.report import (
     COLORS,
+    TABLE_3,
     Report,
     active,
+    below_printed,
     draw_activities,
     draw_ellipses,
     error_axes,
     legend_below,
     map_panels,
+    paper_table,
     window_over,
 )
 from scripts.paper.room_pages import RULE, fig_rmse, run_all, score_table, seconds_of, verdict

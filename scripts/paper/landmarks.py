@@ -15,18 +15,20 @@ import numpy as np
 
 from scripts.figures import styled
 from scripts.paper.census import GATE_M, PEAK
-from scripts.paper.comparison import TABLE_2, below_printed, paper_table
 from scripts.paper.point_runs import SHUNTING, run_one
 from scripts.paper.report import (
     COLORS,
+    TABLE_2,
     Report,
     active,
+    below_printed,
     draw_activities,
     draw_ellipses,
     error_axes,
     legend_below,
     map_panels,
     new_figure,
+    paper_table,
     window_about,
     window_over,
 )  # fmt: skip

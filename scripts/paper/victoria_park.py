@@ -9,7 +9,6 @@ from typing import Any
 import numpy as np
 
 from scripts.figures import styled
-from scripts.paper.comparison import TABLE_1, paper_table
 from scripts.paper.park_runs import SYSTEMS, read, run_graph, run_one
 from scripts.paper.park_scores import (
     FASTEST,
@@ -26,6 +25,7 @@ from scripts.paper.park_scores import (
 )
 from scripts.paper.report import (
     COLORS,
+    TABLE_1,
     Report,
     active,
     draw_activities,
@@ -33,6 +33,7 @@ from scripts.paper.report import (
     error_axes,
     legend_below,
     map_panels,
+    paper_table,
     window_about,
     window_over,
 )

@@ -100,8 +100,7 @@ def run(
             with timed(work):
                 on_scene(slams, settings, outputs)
     elif log is not None:
-        from scripts.days.one import Maps
-        from scripts.single_run.run import Log, on_log, on_log_work
+        from scripts.single_run.run import Log, Maps, on_log, on_log_work
 
         maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"

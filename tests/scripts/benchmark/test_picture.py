@@ -7,7 +7,7 @@ from pathlib import Path
 
 import numpy as np
 
-from scripts.benchmark import picture, publish, published
+from scripts.benchmark import publish, published
 from scripts.benchmark.scores import ranking
 from scripts.benchmark.tracks import LEVELS
 from tests.scripts.benchmark.test_scores import runs
@@ -22,10 +22,10 @@ def test_the_shares_of_a_line_are_of_the_runs_that_rank():
 
 def test_names_at_the_ends_of_lines_never_overlap():
     for ends in ([0.0] * 12, [100.0] * 12, [3.0, 50.0, 51.0, 52.0, 99.0, 100.0]):
-        places = picture.spread(ends)
-        assert np.diff(sorted(places)).min() >= picture.APART - 1e-9
+        places = publish.spread(ends)
+        assert np.diff(sorted(places)).min() >= publish.APART - 1e-9
         assert max(places) <= 100.0 + 1e-9
-    assert picture.spread([10.0, 90.0]) == [10.0, 90.0]
+    assert publish.spread([10.0, 90.0]) == [10.0, 90.0]
 
 
 def test_what_ships_is_published_and_a_folder_without_days_refused(tmp_path: Path):

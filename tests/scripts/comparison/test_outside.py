@@ -151,7 +151,7 @@ def test_after_a_change_in_code_of_ones_own_what_depends_on_it_is_made_again(
 def test_rows_are_scored_again_when_what_scores_them_changes():
     plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
     ((_, _, job),) = plan.entries()
-    scoring = {"entry.py", "maps.py", "sight.py", "judged.py", "row.py", "table.py"}
+    scoring = {"entry.py", "maps.py", "judged.py", "table.py"}
     assert scoring | {"slam"} <= {path.name for path in job.code}
     assert not {"tables.py", "verb.py", "plan.py"} & {path.name for path in job.code}
 

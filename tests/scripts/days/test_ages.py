@@ -7,7 +7,7 @@ from types import SimpleNamespace
 
 import numpy as np
 
-from scripts.days.ages import ages_of, verdicts
+from scripts.days.truth import ages_of, verdicts
 from slam.tracker.belief.status import Status
 
 

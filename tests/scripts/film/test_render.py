@@ -17,9 +17,9 @@ from typer.testing import CliRunner
 from scripts.cli import app
 from scripts.film.encode import FILM_S, Pace, size_of
 from scripts.film.footage import of_scene, open_run
-from scripts.film.layout import Layout
+from scripts.film.map_pane import RobotScan
+from scripts.film.panes import Layout
 from scripts.film.render import Liveliest
-from scripts.film.scan_pane import RobotScan
 from sim.core.versions import WORLD
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe

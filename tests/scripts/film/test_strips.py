@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scripts.film.strips import GAP, LABEL, MARGIN, evenly, strip
+from scripts.film.render import GAP, LABEL, MARGIN, evenly, strip
 from slam.errors import InvalidValueError
 
 

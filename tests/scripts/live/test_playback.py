@@ -8,8 +8,7 @@ from typing import Any
 
 import pytest
 
-from scripts.live.playback import KEPT_S, Pace, Playback
-from scripts.live.requests import MOST_WAITING, Inbox, Run, Seek, Step
+from scripts.live.playback import KEPT_S, MOST_WAITING, Inbox, Pace, Playback, Run, Seek, Step
 from slam.errors import InvalidValueError, SlamFailedError
 
 

@@ -11,7 +11,7 @@ import pytest
 from hypothesis import given, settings
 from hypothesis import strategies as st
 
-from scripts.live.requests import Anew, Click, Drive, Run, Seek, Speed
+from scripts.live.playback import Anew, Click, Drive, Run, Seek, Speed
 from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError
 

@@ -11,7 +11,7 @@ import pytest
 from scripts.closed_loop import tables
 from scripts.closed_loop.make import carry_out
 from scripts.closed_loop.plan import Plan
-from scripts.closed_loop.runs import Driven, load, run_one
+from scripts.closed_loop.runs import DrivenRun, load, run_one
 from scripts.verbs.drive import _goals, _seeds
 from sim.loop import LoopConfig
 from slam.errors import OutputError
@@ -105,7 +105,7 @@ def test_a_level_counts_goals_over_seeds_and_says_how_sure_it_is():
         identity = {"scene": "office", "dynamism": 0.5, "seed": seed, "slam": "mine"}
         rest = {"lost_s": 3.0 if seed else None, "found_s": None, "failure": ["", ""]}
         arrays = {"believed": np.zeros((2, 3)), "true": np.ones((2, 3)), "trusted": np.ones(2)}
-        runs.append(Driven(identity=identity, goals=goals, rest=rest, arrays=arrays))
+        runs.append(DrivenRun(identity=identity, goals=goals, rest=rest, arrays=arrays))
     rows = [row for run in runs for row in tables.goal_rows(run)]
     (level,) = tables.levels(rows, [tables.run_row(run) for run in runs])
     assert (level["goals"], level["reached"], level["success"]) == (4, 2, 0.5)
