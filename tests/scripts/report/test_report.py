@@ -306,18 +306,6 @@ def test_a_browser_shows_it_on_a_phone_and_on_a_desk(written: Path, tmp_path: Pa
         assert browser.evaluate(edge) <= 688
 
 
-@pytest.mark.skipif(CHROMIUM is None, reason="no Chromium here (apt-get install chromium)")
-def test_the_browser_would_notice(tmp_path: Path):
-    """Two-sided: a page that asks, complains and overflows is caught."""
-    bad = tmp_path / "bad.html"
-    bad.write_text('<p style="width: 900px">x</p><img src="none.png"><script>undefined.x</script>')
-    with Browser(tmp_path / "profile") as browser:
-        browser.open(bad, 375)
-        assert browser.evaluate("document.documentElement.scrollWidth") > 375
-        assert any(address.endswith("none.png") for address in browser.requests)
-        assert browser.console
-
-
 def other_folder(tmp_path: Path, kind: str) -> Path:
     folder = tmp_path / kind
     folder.mkdir()
