@@ -237,11 +237,15 @@ def _runs(path: Path, track: str, runs: Any, wanted: set[tuple[float, int]]) -> 
 
 
 _SEED, _POSITIVE = number(most=MAX_SEED, whole=True), number(most=MOST)
-_LEVEL = Rule(f"of {LEVELS}", lambda value: is_number(value) and value in LEVELS)
+LEVEL = Rule(f"of {LEVELS}", lambda value: is_number(value) and value in LEVELS)
 SHA256 = Rule("a SHA-256", lambda value: isinstance(value, str) and bool(_DIGEST.fullmatch(value)))
 SEEDS = Rule(
     f"whole numbers, 0 to {MAX_SEED}",
     lambda value: many(_SEED).holds(value) and len(value) <= MAX_SEEDS,
+)
+MADE_WITH = Rule(
+    f"an object, at most {MAX_DEPTH} deep",
+    lambda value: isinstance(value, dict) and is_shallow(value),
 )
 _HEAD: Mapping[str, Rule] = {
     "slam": word(most=MAX_WORDS),
@@ -250,20 +254,17 @@ _HEAD: Mapping[str, Rule] = {
     "seeds": SEEDS,
     "levels": Rule(
         f"of {LEVELS}, rising",
-        lambda value: many(_LEVEL).holds(value) and list(value) == sorted(value),
+        lambda value: many(LEVEL).holds(value) and list(value) == sorted(value),
     ),
     "seconds": Rule(
         f"null, or up to {MAX_SECONDS:g}",
         lambda value: value is None or (value != 0 and number(most=MAX_SECONDS).holds(value)),
     ),
     "tracks": Rule("one or more", lambda value: isinstance(value, dict) and bool(value)),
-    "made_with": Rule(
-        f"an object, at most {MAX_DEPTH} deep",
-        lambda value: isinstance(value, dict) and is_shallow(value),
-    ),
+    "made_with": MADE_WITH,
 }
 RUN: Mapping[str, Rule] = {
-    "level": _LEVEL, "seed": _SEED, "recording": SHA256, "poses": SHA256,
+    "level": LEVEL, "seed": _SEED, "recording": SHA256, "poses": SHA256,
     "outcome": word(among=OUTCOMES), "failure": word(most=MAX_WORDS, optional=True),
     **{
         key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS

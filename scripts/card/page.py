@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
 import numpy as np
 from matplotlib.axes import Axes
@@ -14,7 +13,7 @@ from PIL import Image
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.card.rows import Bench, box, only, post
+from scripts.card.rows import HEADINGS, Bench, Row, box, only, post
 from scripts.figures import save, styled
 from scripts.marks import table, with_tables_apart
 from sim.sensors.lidar.models.lms221 import Lms221Config
@@ -23,23 +22,7 @@ from sim.sensors.lidar.sheet import NOT_STATED
 from slam.files import make_folder, write_text
 from slam.frames import Float
 
-HEADINGS = ("", "what", "data sheet", "measured", "source")
-MARKS = {True: "✓", False: "✗"}
 STYLES = {"✓": "[green]✓[/green]", "✗": "[red]✗[/red]"}
-
-
-class Row(NamedTuple):
-    """One line of a card; ``kept`` whether what was measured agrees with the data sheet."""
-
-    what: str
-    datasheet: str
-    measured: str
-    source: str
-    kept: bool
-
-    def cells(self) -> tuple[str, ...]:
-        """Under ``HEADINGS``."""
-        return (MARKS[self.kept], *self[:4])
 
 
 def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:

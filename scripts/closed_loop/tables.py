@@ -31,12 +31,6 @@ RUN_COLUMNS = (
     "near_misses", "ate_m", "lost_s", "recovered", "recovered_s", "not_trusted_share", "failure",
     "failure_words",
 )  # fmt: skip
-LEVEL_COLUMNS = (
-    "scene", "dynamism", "slam", "runs", "goals", "reached", "success", "success_low",
-    "success_high", "wrong", "given_up", "failed", "given_up_taken", "precision_m",
-    "precision_m_low", "precision_m_high", "precision_rad", "time_s", "collisions_per_km",
-    "near_misses_per_km", "runs_lost", "runs_recovered",
-)  # fmt: skip
 
 
 def goal_rows(run: DrivenRun) -> list[Row]:
@@ -116,14 +110,16 @@ def _level(key: tuple[Any, ...], goals: list[Row], runs: list[Row]) -> Row:
 LEVELS = "levels.csv"
 _COUNT, _SHARE = number(most=1e9, whole=True), number(most=1.0)
 _SOME = number(least=1.0, most=1e9, whole=True)
+_MAYBE = number(optional=True)
 _COLUMNS: Columns = {
-    **dict.fromkeys(LEVEL_COLUMNS, number(optional=True)),
     "scene": word(), "dynamism": _SHARE, "slam": word(), "runs": _SOME, "goals": _SOME,
+    "reached": _COUNT, "success": _SHARE, "success_low": _SHARE, "success_high": _SHARE,
+    "wrong": _COUNT, "given_up": _COUNT, "failed": _COUNT, "given_up_taken": _COUNT,
     **dict.fromkeys(
-        ("reached", "wrong", "given_up", "failed", "given_up_taken", "runs_lost", "runs_recovered"),
-        _COUNT,
+        ("precision_m", "precision_m_low", "precision_m_high", "precision_rad", "time_s",
+         "collisions_per_km", "near_misses_per_km"), _MAYBE,
     ),
-    **dict.fromkeys(("success", "success_low", "success_high"), _SHARE),
+    "runs_lost": _COUNT, "runs_recovered": _COUNT,
 }  # fmt: skip
 TABLE = Table(
     columns=_COLUMNS, key=("scene", "dynamism", "slam"),

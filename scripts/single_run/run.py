@@ -17,7 +17,7 @@ import numpy as np
 from scripts.console import note, say, working
 from scripts.film.encode import Pace
 from scripts.film.footage import Footage, of_log, of_scene
-from scripts.pace import Work
+from scripts.pace import Work, announce, timed
 from scripts.single_run.session import Outputs, run_session
 from slam.days.history import History
 from slam.days.session import Session, keep, read_history
@@ -313,26 +313,28 @@ def on_log(
     return results
 
 
-def on_scene_work(names: list[str], seconds: float, film: bool) -> Work:
-    """For an estimate: about so much for each SLAM, and more with a film."""
-    return Work("run on a scene" + ", filmed" * film, seconds * len(names))
-
-
 def on_log_work(names: list[str], path: Path, film: bool) -> Work:
-    """The same of a log, which is not read for it: by its MB."""
+    """For an estimate: by the MB of a log, which is not read for it, for each SLAM."""
     files = path.rglob("*") if path.is_dir() else [path]
     size = sum(file.stat().st_size for file in files if file.is_file())
     return Work(f"run on {path.suffix}" + ", filmed" * film, size / 1e6 * len(names))
 
 
-def on_scene(names: list[str], settings: Mapping[str, Any], outputs: Outputs) -> dict[str, Any]:
-    """Run SLAMs on a tour of a scene.
+def on_scene(
+    names: list[str], settings: Mapping[str, Any], outputs: Outputs, *, plan_only: bool = False
+) -> None:
+    """Say what is ahead; then, unless that is all (``plan_only``), run SLAMs on a tour of a scene.
 
     settings  scene, seconds, dynamism, seed; further keys go to ``Simulation``
     """
-    with of_scene(settings, view="follow" if outputs.film else None) as footage:
+    seconds, filmed = settings["seconds"], ", filmed" * outputs.film
+    work = Work(f"run on a scene{filmed}", seconds * len(names))
+    announce(f"{seconds:g} s of {settings['scene']}{filmed}", [work])
+    if plan_only:
+        return
+    with timed(work), of_scene(settings, view="follow" if outputs.film else None) as footage:
         show = footage.show(names)
         if outputs.film and footage.no_camera:
             note(f"the film has no 3D panel: {footage.no_camera}")
         recipe = {"slams": list(show.replay.tracks), **settings, **footage.made_with}
-        return run_session(footage.stream, show, replace(outputs, settings=recipe))
+        run_session(footage.stream, show, replace(outputs, settings=recipe))

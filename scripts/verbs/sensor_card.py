@@ -55,7 +55,7 @@ def beside_sheet(scanner: str, out: Path | None) -> None:
     with working("measuring"):
         measured = rows.rows() if usual else stated.rows_of(scanner)
     cells = [row.cells() for row in measured]
-    console.print(page.printed(f"{describe(scanner)} (simulated)", page.HEADINGS, cells))
+    console.print(page.printed(f"{describe(scanner)} (simulated)", rows.HEADINGS, cells))
     if out is not None:
         if usual:
             make_folder(out / "pictures")

@@ -12,11 +12,10 @@ import pytest
 
 from scripts.benchmark.tracks import TRACKS
 from scripts.comparison.recording import Recording
-from scripts.console import ended
 from scripts.experiments import ablation, study
 from scripts.experiments.study import Study, of, on_track
 from sim.simulation import Simulation, tour
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.errors import UnknownNameError
 from slam.system import create
 
 NAMES = ("ablation", "logs")
@@ -84,16 +83,6 @@ def test_what_cannot_be_run_is_told_in_a_line(tmp_path: Path, capsys):
         assert STUDIES["ablation"].main([*words.split(), *more]) == 1
         assert capsys.readouterr().err.startswith(says)
     assert not list(tmp_path.iterdir())
-
-
-def test_an_error_of_ours_ends_an_experiment_in_a_line(capsys: pytest.CaptureFixture):
-    @ended
-    def wrong() -> int:
-        raise InvalidValueError("motion must be one of 1, 0.75, 0.5, got 0.3")
-
-    assert wrong() == 1
-    assert capsys.readouterr().err == "motion must be one of 1, 0.75, 0.5, got 0.3\n"
-    assert ended(lambda: None)() == 0
 
 
 def test_a_run_that_fails_counts_as_lost(monkeypatch: pytest.MonkeyPatch):

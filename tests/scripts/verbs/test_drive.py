@@ -12,7 +12,7 @@ from scripts.closed_loop import tables
 from scripts.closed_loop.make import carry_out
 from scripts.closed_loop.plan import Plan
 from scripts.closed_loop.runs import DrivenRun, load, run_one
-from scripts.verbs.drive import _goals, _seeds
+from scripts.verbs.drive import _seeds
 from sim.loop import LoopConfig
 from slam.errors import OutputError
 
@@ -63,12 +63,10 @@ def test_somebody_elses_folder_is_refused(tmp_path):
         carry_out(plan(), tmp_path)
 
 
-def test_seeds_and_goals_are_a_number_or_a_list():
+def test_seeds_are_a_number_or_a_list():
     assert _seeds(("2",)) == (100, 101)
     assert _seeds(("3", "7")) == (3, 7)
     assert _seeds(("3:6",)) == (3, 4, 5)
-    assert _goals(("2",)) == 2
-    assert _goals(("lounge", "copy")) == ("lounge", "copy")
 
 
 def test_a_slam_that_cannot_be_made_has_failed_at_every_goal(tmp_path, monkeypatch):
