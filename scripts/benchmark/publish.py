@@ -38,6 +38,12 @@ from slam.variants import ORACLE
 DOCS = ROOT / "docs"
 _COUNTS = {True: "yes", False: "no", None: "open"}
 PAGE, BOARD = "benchmark.md", "leaderboard.md"
+PERCENT = 100.0
+APART = 4.2  # percent between two names at the ends of their lines
+_COLORS = ("#ce2c3c", "#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#5d8a1e", "#b8418f", "#2f9fd0",
+           "#a0583c", "#3b2f7d", "#59616e", "#de6e18")  # fmt: skip
+_CONTROL = "#9a9a9a"
+_MARKERS = "osD^vP*Xh<>d"
 
 
 def tracks_of(of: Published) -> list[Track]:
@@ -164,14 +170,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
 
 if __name__ == "__main__":
     sys.exit(main())
-
-
-PERCENT = 100.0
-APART = 4.2  # percent between two names at the ends of their lines
-_COLORS = ("#ce2c3c", "#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#5d8a1e", "#b8418f", "#2f9fd0",
-           "#a0583c", "#3b2f7d", "#59616e", "#de6e18")  # fmt: skip
-_CONTROL = "#9a9a9a"
-_MARKERS = "osD^vP*Xh<>d"
 
 
 def _look(slam: str, k: int) -> dict[str, Any]:

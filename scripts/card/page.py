@@ -23,6 +23,49 @@ from slam.files import make_folder, write_text
 from slam.frames import Float
 
 STYLES = {"✓": "[green]✓[/green]", "✗": "[red]✗[/red]"}
+RED, GREY = "#ce2c3c", "#8a8a8a"
+Window = tuple[float, float, float, float]
+_BACK = box(4.05, 0.0, 0.05, 2.5)
+# Name -> (MJCF, window of the picture: x from, x to, y from, y to in m).
+SCENES: Mapping[str, tuple[str, Window]] = {
+    "a white wall": (box(3.05, 0.0, 0.05, 2.5), (2.93, 3.07, -0.3, 0.3)),
+    "a black wall,\nseen along it": (
+        box(5.0, -1.05, 8.0, 0.05, "plastic_black"),
+        (-0.3, 10.0, -1.5, -0.5),
+    ),
+    "a corner, 0.5 m\nbefore a wall": (
+        box(3.25, 0.915, 0.25, 0.9) + box(3.55, 0.0, 0.05, 2.5),
+        (2.9, 3.6, -0.25, 0.25),
+    ),
+    "a chair's column,\n0.6 m before a wall": (
+        post(3.4, 0.0, 0.025, "metal") + _BACK,
+        (3.25, 4.12, -0.2, 0.2),
+    ),
+    "a person's legs": (
+        post(3.3, 0.13, 0.06, "trousers") + post(3.4, -0.1, 0.06, "trousers") + _BACK,
+        (3.1, 4.12, -0.3, 0.3),
+    ),
+    "a pane beside the\nway, walls ahead\nand behind it": (
+        box(2.25, -0.6, 2.75, 0.006, "glass")
+        + box(6.05, 0.7, 0.05, 1.3)
+        + box(2.0, -2.05, 4.0, 0.05),
+        (-0.7, 6.4, -2.4, 1.8),
+    ),
+}
+_SPOT = {"spot": True, "reflectivity": True}
+_SEEN = {**_SPOT, "incidence": True}
+# Those effects that need others to show come with them.
+COLUMNS: Mapping[str, Lms221Config] = {
+    "10 mm noise": only(noise_std_m=0.010),
+    "rounding (counter,\ncm mode)": only({"timer": True}, quantise=True),
+    "systematic error\nof one unit": only({"systematic": True}),
+    "spot, first pulse,\nreflectivity": only(_SPOT),
+    "spot ... +\nmixed pixels": only({**_SPOT, "mixed_pixels": True}),
+    "spot ... +\nincidence": only(_SEEN),
+    "spot ... + incidence,\nglass and bounce": only({**_SEEN, "glass": True, "bounce": True}),
+    "everything": Lms221Config(),
+}
+SCANS = 12
 
 
 def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -116,51 +159,6 @@ NOTES = (
     "Not simulated: warm-up drift, dazzle by sunlight (`dropout_rate` stands in for it),",
     "a dirty window, two scanners that disturb each other.",
 )
-
-
-RED, GREY = "#ce2c3c", "#8a8a8a"
-Window = tuple[float, float, float, float]
-_BACK = box(4.05, 0.0, 0.05, 2.5)
-# Name -> (MJCF, window of the picture: x from, x to, y from, y to in m).
-SCENES: Mapping[str, tuple[str, Window]] = {
-    "a white wall": (box(3.05, 0.0, 0.05, 2.5), (2.93, 3.07, -0.3, 0.3)),
-    "a black wall,\nseen along it": (
-        box(5.0, -1.05, 8.0, 0.05, "plastic_black"),
-        (-0.3, 10.0, -1.5, -0.5),
-    ),
-    "a corner, 0.5 m\nbefore a wall": (
-        box(3.25, 0.915, 0.25, 0.9) + box(3.55, 0.0, 0.05, 2.5),
-        (2.9, 3.6, -0.25, 0.25),
-    ),
-    "a chair's column,\n0.6 m before a wall": (
-        post(3.4, 0.0, 0.025, "metal") + _BACK,
-        (3.25, 4.12, -0.2, 0.2),
-    ),
-    "a person's legs": (
-        post(3.3, 0.13, 0.06, "trousers") + post(3.4, -0.1, 0.06, "trousers") + _BACK,
-        (3.1, 4.12, -0.3, 0.3),
-    ),
-    "a pane beside the\nway, walls ahead\nand behind it": (
-        box(2.25, -0.6, 2.75, 0.006, "glass")
-        + box(6.05, 0.7, 0.05, 1.3)
-        + box(2.0, -2.05, 4.0, 0.05),
-        (-0.7, 6.4, -2.4, 1.8),
-    ),
-}
-_SPOT = {"spot": True, "reflectivity": True}
-_SEEN = {**_SPOT, "incidence": True}
-# Those effects that need others to show come with them.
-COLUMNS: Mapping[str, Lms221Config] = {
-    "10 mm noise": only(noise_std_m=0.010),
-    "rounding (counter,\ncm mode)": only({"timer": True}, quantise=True),
-    "systematic error\nof one unit": only({"systematic": True}),
-    "spot, first pulse,\nreflectivity": only(_SPOT),
-    "spot ... +\nmixed pixels": only({**_SPOT, "mixed_pixels": True}),
-    "spot ... +\nincidence": only(_SEEN),
-    "spot ... + incidence,\nglass and bounce": only({**_SEEN, "glass": True, "bounce": True}),
-    "everything": Lms221Config(),
-}
-SCANS = 12
 
 
 @styled({"font.size": 8, "grid.alpha": 0.3})

@@ -23,7 +23,7 @@ from scripts.closed_loop import tables
 from scripts.closed_loop.plan import RUNS, SCHEMA, Plan
 from scripts.closed_loop.runs import DrivenRun, load
 from scripts.closed_loop.tables import LEVELS, TABLE
-from scripts.comparison.tables import write_checked, write_csv
+from scripts.comparison.tables import Row, write_checked, write_csv
 from scripts.console import level_table
 from scripts.figures import COLORS, color_of, save, styled
 from scripts.jobs import run_jobs, try_names
@@ -37,8 +37,12 @@ from slam.evaluation.lost import FOUND_RULE, LOST_RULE
 from slam.files import write_text
 from slam.frames import Float
 
+PX_PER_M = 40
+PALE = 0.35  # of the colour of what can move
+MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
 
-def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
+
+def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[Row]:
     """Drive what is missing, write tables and pictures; the rows of ``levels.csv``."""
     built = registry.build(plan.scene)  # wrong names are told before anything starts
     for name in plan.goals if isinstance(plan.goals, tuple) else ():
@@ -59,7 +63,7 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
             return _write(staged, plan, runs)
 
 
-def _write(out: Path, plan: Plan, runs: list[DrivenRun]) -> list[dict[str, Any]]:
+def _write(out: Path, plan: Plan, runs: list[DrivenRun]) -> list[Row]:
     goals = [row for run in runs for row in tables.goal_rows(run)]
     rows = [tables.run_row(run) for run in runs]
     summary = tables.levels(goals, rows)
@@ -82,7 +86,7 @@ def _write(out: Path, plan: Plan, runs: list[DrivenRun]) -> list[dict[str, Any]]
     return summary
 
 
-def said(plan: Plan, rows: list[dict[str, Any]]) -> list[str]:
+def said(plan: Plan, rows: list[Row]) -> list[str]:
     """Goals reached by each SLAM at the lowest and the highest level."""
     lines = []
     for level in dict.fromkeys((plan.levels[0], plan.levels[-1])):
@@ -92,7 +96,7 @@ def said(plan: Plan, rows: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def success_table(plan: Plan, rows: list[dict[str, Any]]) -> Table:
+def success_table(plan: Plan, rows: list[Row]) -> Table:
     """Success and precision, to be printed."""
     at = {(row["dynamism"], row["slam"]): row for row in rows}
     title = f"{plan.scene}: goals reached, %; median precision, cm; runs lost"
@@ -103,15 +107,9 @@ def success_table(plan: Plan, rows: list[dict[str, Any]]) -> Table:
     )  # fmt: skip
 
 
-def _cell(row: dict[str, Any]) -> str:
+def _cell(row: Row) -> str:
     precise = "-" if row["precision_m"] is None else f"{100.0 * row['precision_m']:.0f}"
     return f"{100.0 * row['success']:.0f} %; {precise}; {row['runs_lost']} of {row['runs']}"
-
-
-Row = dict[str, Any]
-PX_PER_M = 40
-PALE = 0.35  # of the colour of what can move
-MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
 
 
 @styled()

@@ -29,6 +29,10 @@ from slam.frontend.deskew import end_points
 from slam.system import Raster
 
 BEYOND_M = 0.3  # a beam that goes this much farther than a point has seen that nothing is there
+MOVED_M = 0.15  # shift of the centre plus turn at the rim that makes it another place
+STILL_S, SEEN_SCANS, LATELY_S = 2.0, 5, 2.0
+APART_M = 0.2  # points nearer to a wall than this tell nothing about a mover
+GRAIN_M = 0.02  # hits nearer to one another are one point
 
 
 class Sight:
@@ -106,12 +110,6 @@ def clearance(points: Float, drive: Recording, k: int) -> Float:
         distance = np.sqrt((offset * offset).sum(axis=1)) - reach
         nearest = np.minimum(nearest, distance)
     return nearest
-
-
-MOVED_M = 0.15  # shift of the centre plus turn at the rim that makes it another place
-STILL_S, SEEN_SCANS, LATELY_S = 2.0, 5, 2.0
-APART_M = 0.2  # points nearer to a wall than this tell nothing about a mover
-GRAIN_M = 0.02  # hits nearer to one another are one point
 
 
 @dataclass(eq=False)

@@ -22,6 +22,7 @@ from slam.files import cell_of, write_text
 
 Row = dict[str, Any]
 R = TypeVar("R", bound=Mapping[str, Any])
+MAX_BYTES = 1 << 29  # of a table: half a million rows of runs.csv
 
 
 def number(row: Row, metric: str) -> float | None:
@@ -93,9 +94,6 @@ def grouped(rows: Iterable[R], keys: Sequence[str]) -> dict[tuple[Any, ...], lis
     for row in rows:
         groups.setdefault(tuple(row[key] for key in keys), []).append(row)
     return groups
-
-
-MAX_BYTES = 1 << 29  # of a table: half a million rows of runs.csv
 
 
 def write_csv(

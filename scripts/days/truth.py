@@ -43,6 +43,9 @@ SEEN_SHARE = 0.5  # of a thing's place that the other session must have seen
 HIT_M = 0.45  # a listed place this near to a true one is it
 _OUTSIDE_M = 500.0  # what is out of the building lies farther away
 _UNCOUNTED = "robot"
+NEWS_S = 2.0  # after which the map has learnt what it saw
+CLEARLY, HARDLY = 0.1, 0.01  # share of a scan's beams that what changed has met or let pass
+AGE_COLUMNS = ("slam", "age", "session", "found_after_s", "place", "rmse_m", "worst_m", "tracked")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -288,11 +291,6 @@ def _is_one(before: Sequence[Spot], after: Sequence[Spot], *, door: bool) -> boo
     """Whether the same thing went from one place and came to the other."""
     went = {t.name for t in before if not t.came and t.door == door}
     return bool(went & {t.name for t in after if t.came and t.door == door})
-
-
-NEWS_S = 2.0  # after which the map has learnt what it saw
-CLEARLY, HARDLY = 0.1, 0.01  # share of a scan's beams that what changed has met or let pass
-AGE_COLUMNS = ("slam", "age", "session", "found_after_s", "place", "rmse_m", "worst_m", "tracked")
 
 
 def keep_copy(map_file: Path, folder: Path, number: int) -> Path:

@@ -21,6 +21,9 @@ from slam.frames import Float, Frame
 FOLLOW_M = 9.0  # around the path, in a view that follows it
 STEP_M = 4.0  # such a view grows in steps: a sliding picture is hard to watch
 STEP_SHARE = 0.1  # of a large view: so that it is drawn again a few dozen times, however large
+_RADII_M = tuple(step * 10.0**k for k in range(-2, 3) for step in (1.0, 2.0, 5.0))
+MOST_M = 80.0  # of what is shown
+_FRONT_UP = np.array([0.0, 0.0, math.pi / 2.0])
 
 
 def _activity_colors() -> Picture:
@@ -154,9 +157,6 @@ class MapPane:
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
-_RADII_M = tuple(step * 10.0**k for k in range(-2, 3) for step in (1.0, 2.0, 5.0))
-
-
 class CloseUp:
     """Paints what lies around the estimate, in the directions of the map pane.
 
@@ -222,10 +222,6 @@ def _grown(radius: float, reach: float) -> float:
     now = _RADII_M.index(radius)
     then = _RADII_M.index(wanted)
     return wanted if then > now or then < now - 1 else radius
-
-
-MOST_M = 80.0  # of what is shown
-_FRONT_UP = np.array([0.0, 0.0, math.pi / 2.0])
 
 
 class RobotScan:

@@ -21,6 +21,9 @@ Painter = Callable[[Any, Any, tuple[int, int]], Picture]
 F = TypeVar("F", bound=Painter)
 MOST = 3  # panes; more would be too small to read
 _panes: dict[str, Painter] = {}  # by title
+MARGIN, TOP, TITLE, GUTTER = 16, 66, 20, 16  # of a 1280 x 720 frame, px
+CHART, LEFT, CLOSE = 240, 480, 150
+MORE = 220  # width of the column of panes that users add, px
 
 
 def pane(title: str) -> Callable[[F], F]:
@@ -60,11 +63,6 @@ def painted(title: str, show: Any, frame: Any, size: tuple[int, int]) -> Picture
 def blank(size: tuple[int, int]) -> Picture:
     """An empty picture of (width, height) to draw on."""
     return np.full((size[1], size[0], 3), draw.PAPER, np.uint8)
-
-
-MARGIN, TOP, TITLE, GUTTER = 16, 66, 20, 16  # of a 1280 x 720 frame, px
-CHART, LEFT, CLOSE = 240, 480, 150
-MORE = 220  # width of the column of panes that users add, px
 
 
 @dataclass(frozen=True)

@@ -22,6 +22,12 @@ from slam.errors import InvalidValueError
 from slam.files import replacing
 from slam.frames import BeamClass, Frame, Stream
 
+CELL_WIDTH = 400  # px
+TOP, GAP, MARGIN = 6, 10, 14
+LABEL = 22  # px above a picture for its time
+KEY_PX, SWATCH = 13, 20  # px, of the words and of the colours of a legend
+Legend = Sequence[tuple[str, draw.Color]]
+
 
 def shoot(stream: Stream, show: Show, reel: Film | None) -> Iterator[Frame]:
     """Replay ``stream`` until the film ends, yield each frame once it is noted and filmed."""
@@ -111,13 +117,6 @@ class Snapshots:
         while not self.done():
             self.pictures.append(self._paint(self._last))
         return self.pictures
-
-
-CELL_WIDTH = 400  # px
-TOP, GAP, MARGIN = 6, 10, 14
-LABEL = 22  # px above a picture for its time
-KEY_PX, SWATCH = 13, 20  # px, of the words and of the colours of a legend
-Legend = Sequence[tuple[str, draw.Color]]
 
 
 def evenly(n: int, start_s: float, end_s: float) -> list[float]:

@@ -27,6 +27,8 @@ EVENTS_NS = NS_PER_S // 5
 _SAYS = {
     "door": "moves", "person": "comes near the robot", "change": "stands elsewhere, unseen",
 }  # fmt: skip
+HOLD_NS = NS_PER_S  # a twist holds so long, then the robot stands: its sender may be gone
+REACH_M = 1.0  # of a click: what is farther from it was not meant
 
 
 class Session:
@@ -128,10 +130,6 @@ class Opener:
         else:
             footage = of_log(self.path)
         return Session(footage, footage.show(self.slams).moments, hands)
-
-
-HOLD_NS = NS_PER_S  # a twist holds so long, then the robot stands: its sender may be gone
-REACH_M = 1.0  # of a click: what is farther from it was not meant
 
 
 class Hands:

@@ -38,6 +38,15 @@ CELL_M = 0.05
 RIM_M = 0.5  # beyond the bounds: whoever gets there is out
 NARROW_M = 0.1  # gaps that are narrower are not told
 DOOR_M = 1.2  # from a hinge to a spot to visit
+Picture = NDArray[np.uint8]
+LONGEST_PX, MOST_PX_PER_M = 2400, 60.0
+PAPER, UNKNOWN, CELL = (255, 255, 255), (225, 227, 230), (240, 150, 40)
+WALL, THING, GOAL = (40, 50, 80), (20, 140, 90), (200, 30, 40)
+START, GAP = (20, 90, 220), (200, 0, 160)
+FLOORS = ((214, 230, 246), (214, 240, 224), (246, 234, 212), (236, 222, 244), (244, 220, 220))
+COLUMNS, STEP_M = 7, 4.2
+PX = 1400
+FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def problems(scene: Scene) -> Iterator[str]:
@@ -153,20 +162,6 @@ def contents(scene: Scene) -> Iterator[str]:
     yield f"spots to visit: {goals or 'none'}"
 
 
-Picture = NDArray[np.uint8]
-
-LONGEST_PX, MOST_PX_PER_M = 2400, 60.0
-PAPER, UNKNOWN, CELL = (255, 255, 255), (225, 227, 230), (240, 150, 40)
-WALL, THING, GOAL, START, GAP = (
-    (40, 50, 80),
-    (20, 140, 90),
-    (200, 30, 40),
-    (20, 90, 220),
-    (200, 0, 160),
-)
-FLOORS = ((214, 230, 246), (214, 240, 224), (246, 234, 212), (236, 222, 244), (244, 220, 220))
-
-
 def over_map(map_: Raster, plan: MapPlan) -> Picture:
     """(height, width, 3) RGB: floor by room, occupied cells orange, walls dark over them."""
     x0, y0, x1, y1 = _extent(plan)
@@ -242,11 +237,6 @@ def _corners(x: float, y: float, a: float, b: float, yaw: float) -> list[tuple[f
     c, s = math.cos(yaw), math.sin(yaw)
     return [(x + u * a * c - v * b * s, y + u * a * s + v * b * c)
             for u, v in ((-1, -1), (1, -1), (1, 1), (-1, 1))]  # fmt: skip
-
-
-COLUMNS, STEP_M = 7, 4.2
-PX = 1400
-FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
 def kinds() -> tuple[tuple[str, ...], tuple[str, ...]]:

@@ -29,6 +29,10 @@ from slam.replay import Track
 from slam.system import create
 from slam.tracker.tracker import Tracker
 
+UNTRUSTED = 1.0 / 3.0  # share of scans: more, and nobody should build on the run
+UNTRUSTED_STATUS = 6  # exit status with --strict
+SURE = 0.99  # probability from which on a mounting is named as the one
+
 
 @dataclass(frozen=True, kw_only=True)
 class Maps:
@@ -101,9 +105,6 @@ def kept(session: Session, maps: Maps) -> None:
         note(f"the map of this session is {written}")
 
 
-UNTRUSTED = 1.0 / 3.0  # share of scans: more, and nobody should build on the run
-UNTRUSTED_STATUS = 6  # exit status with --strict
-SURE = 0.99  # probability from which on a mounting is named as the one
 _log = logging.getLogger(__name__)
 
 
