@@ -81,7 +81,9 @@ def code_of(
     imports, the files of a SLAM and of a scene of somebody's own, and what ``--with`` has loaded.
     """
     scripts = scripts_of(inspect.getfile(call), call.__module__)
-    own = (*source_of(slam), *source_of_scene(scene), *source_of_loaded())
+    # What ``--with`` loads registers names that do not tell where they come from.
+    registered = (file for module in loaded() for file in _of_module(module))
+    own = (*source_of(slam), *source_of_scene(scene), *registered)
     return (*sources(*packages), *scripts, *own)
 
 
@@ -121,12 +123,6 @@ def source_of_scene(scene: str) -> tuple[Path, ...]:
     module, colon, _ = scene.partition(":")
     python = _of_module(module) if colon else ()
     return (*python, *sorted({xml for file in python for xml in file.parent.glob("*.xml")}))
-
-
-def source_of_loaded() -> tuple[Path, ...]:
-    """The files of the modules that ``--with`` has loaded: what they register is known by a name
-    that does not tell where it comes from."""
-    return tuple(file for module in loaded() for file in _of_module(module))
 
 
 def _of_module(module: str) -> tuple[Path, ...]:

@@ -74,11 +74,8 @@ class Job:
         call = f"{self.call.__module__}.{self.call.__qualname__}"
         told = json.dumps([call, dict(self.arguments), _versions()], sort_keys=True)
         sources = "".join(_digest(path) for path in self.code)
-        return f"{self.name}-{_short(told + sources)}{self.suffix}"
-
-
-def _short(text: str) -> str:
-    return hashlib.sha256(text.encode()).hexdigest()[:10]
+        digest = hashlib.sha256((told + sources).encode()).hexdigest()[:10]
+        return f"{self.name}-{digest}{self.suffix}"
 
 
 _versions = cache(versions)

@@ -15,25 +15,9 @@ from typing import Any
 from scripts.machine import versions
 from sim.core.versions import WORLD
 from sim.recording.sums import check_vouched, write_sums
-from slam import locks
+from slam import files, locks
 from slam.bounded import check_file
 from slam.errors import LogFormatError, OutputError
-from slam.files import (
-    PART,
-    clear_parts,
-    exchange,
-    is_part,
-    locked,
-    make_folder,
-    put,
-    reason,
-    remove,
-    remove_empty,
-    sync,
-    sync_names,
-    sync_tree,
-    write_text,
-)
 from slam.names import NameFromFile
 from slam.system import config_of
 
@@ -66,21 +50,21 @@ def whole_folder(
     (where the file system cannot swap two names, the earlier one perhaps as .NAME.PID.old).
     """
     said, path = path, path.absolute()
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{PART}")
+    temporary = path.with_name(f".{path.name}.{os.getpid()}{files.PART}")
     made: list[Path] = []
     try:
         with _told(said, temporary):
-            made = make_folder(path.parent)
+            made = files.make_folder(path.parent)
             _refuse(path, overwrite, command, settings or {})
-            clear_parts(path)
+            files.clear_parts(path)
             temporary.mkdir()
-            with locked(temporary):
+            with files.locked(temporary):
                 yield temporary
                 write_sums(temporary)
                 _take_place(temporary, path)
     finally:
-        remove(temporary)
-        remove_empty(made)
+        files.remove(temporary)
+        files.remove_empty(made)
 
 
 @contextmanager
@@ -94,7 +78,7 @@ def _told(said: Path, temporary: Path | None = None) -> Iterator[None]:
         raise OutputError(str(error).replace(str(temporary), str(said))) from error
     except OSError as error:
         where = said if said.is_dir() else said.absolute().parent
-        raise OutputError(f"cannot write {said}: {reason(error, where)}") from error
+        raise OutputError(f"cannot write {said}: {files.reason(error, where)}") from error
 
 
 @contextmanager
@@ -107,15 +91,15 @@ def locked_folder(out: Path) -> Iterator[None]:
     made: list[Path] = []
     try:
         with _told(out):
-            made = make_folder(out)
+            made = files.make_folder(out)
             ours = (out / RECIPE).exists()
             names = (f.name for f in out.iterdir())
-            if not ours and any(n not in locks.NAMES and not is_part(n) for n in names):
+            if not ours and any(n not in locks.NAMES and not files.is_part(n) for n in names):
                 raise OutputError(FOREIGN.format(out))
             with locks.locked(out):
                 yield
     finally:
-        remove_empty(made)
+        files.remove_empty(made)
 
 
 @contextmanager
@@ -132,13 +116,13 @@ def together(folder: Path) -> Iterator[Path]:
     staged = folder / STAGED
     try:
         with _told(folder, staged):
-            remove(staged)
+            files.remove(staged)
             staged.mkdir()
             yield staged
             write_sums(staged, GROWING, over=folder)
-            put(staged, folder / READY)
+            files.put(staged, folder / READY)
     finally:
-        remove(staged)
+        files.remove(staged)
     put_tables(folder)
 
 
@@ -171,13 +155,13 @@ def put_tables(folder: Path) -> None:
         places = {folder}
         for file in sorted(file for file in ready.rglob("*") if file.is_file()):
             place = folder / file.relative_to(ready)
-            make_folder(place.parent)
+            files.make_folder(place.parent)
             os.replace(file, place)
             places.add(place.parent)
         for changed in sorted(places):
-            sync(changed)
+            files.sync(changed)
         shutil.rmtree(ready)
-        sync(folder)
+        files.sync(folder)
 
 
 def check_whole(folder: Path) -> None:
@@ -226,11 +210,11 @@ def _what_lies_there(path: Path, command: str, settings: Mapping[str, Any]) -> s
 def _take_place(temporary: Path, path: Path) -> None:
     """Move the new folder in and the old one out, at once where the system can do that."""
     if not path.exists():
-        put(temporary, path)
+        files.put(temporary, path)
         return
-    sync_tree(temporary)
-    if exchange(temporary, path):
-        sync_names(path.parent)  # the old one has the temporary name, which is removed
+    files.sync_tree(temporary)
+    if files.exchange(temporary, path):
+        files.sync_names(path.parent)  # the old one has the temporary name, which is removed
         return
     aside = path.with_name(f".{path.name}.{os.getpid()}{OLD}")
     path.rename(aside)
@@ -239,8 +223,8 @@ def _take_place(temporary: Path, path: Path) -> None:
     except OSError:
         aside.rename(path)
         raise
-    sync_names(path.parent)
-    remove(aside)
+    files.sync_names(path.parent)
+    files.remove(aside)
 
 
 def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:
@@ -254,7 +238,7 @@ def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> Non
     if configs := configs_of(named):
         recipe["configs"] = configs
     text = json.dumps(recipe, indent=2, sort_keys=True, allow_nan=False)
-    write_text(folder / RECIPE, text + "\n")
+    files.write_text(folder / RECIPE, text + "\n")
 
 
 def configs_of(slams: Iterable[str]) -> dict[str, Any]:

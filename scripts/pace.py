@@ -17,6 +17,7 @@ from statistics import median
 from typing import NamedTuple
 
 from scripts.console import in_time, say
+from slam.checked import is_number
 from slam.files import make_folder, write_text
 
 KEPT = 0.6  # of a rate that is known, when a slower one is measured
@@ -43,12 +44,10 @@ def rates() -> dict[str, float]:
         with state().open("rb") as file:
             found = json.loads(file.read(MOST_BYTES))
         if isinstance(found, dict):
-            return {str(k): float(v) for k, v in found.items() if _is_rate(v)}
+            return {
+                str(k): float(v) for k, v in found.items() if is_number(v) and 0.0 <= v < math.inf
+            }
     return {}
-
-
-def _is_rate(value: object) -> bool:
-    return isinstance(value, int | float) and math.isfinite(value) and value >= 0.0
 
 
 def learn(spent: Iterable[tuple[Work, float]]) -> None:

@@ -10,7 +10,7 @@ from pathlib import Path
 from typing import Any
 
 from scripts.benchmark import submission
-from scripts.closed_loop import folder as closed_loop
+from scripts.closed_loop import tables as closed_loop
 from scripts.comparison import folder as compared
 from scripts.comparison import schema
 from scripts.comparison.run_file import RunFile

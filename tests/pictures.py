@@ -14,7 +14,7 @@ from slam.frames import Stream
 def pictures_at(
     stream: Stream, show: Show, seconds: Sequence[float], *, whole: bool = False
 ) -> list[Picture]:
-    """Of a run at these moments, for ``scripts.film.strips``.
+    """Of a run at these moments, for ``scripts.film.render``.
 
     Scan above map each (``Show.vignette``); ``whole``: all of the film frame.
     """

@@ -59,6 +59,7 @@ def outside(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Path:
     """An empty folder to stand in; what is registered there is forgotten afterwards."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.setattr(sys, "path", [*sys.path, str(tmp_path)])
+    scanners.names()  # which loads our own, once
     for module, registry in (
         (panes, "_panes"), (topics, "_topics"), (scanners, "_models"), (system, "_registry"),
         (session, "_files"), (logs, "_registered"),

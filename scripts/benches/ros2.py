@@ -16,9 +16,8 @@ from dataclasses import replace
 
 import numpy as np
 
-from scripts.live.network import Network
 from scripts.live.session import Opener
-from scripts.live.view import View
+from scripts.live.view import Network, View
 from sim.view.moment import Shown
 from slam.frames import NS_PER_S
 from slam.logs.bag import stamp_of

@@ -13,13 +13,12 @@ from typing import Any
 
 from scripts.benchmark.scores import COLUMNS, RANKED, SILENT, TRACKING, Row, ranking, scores
 from scripts.benchmark.tracks import LEVELS, Track
-from scripts.comparison.csv_files import write_csv
 from scripts.comparison.schema import FAILED
+from scripts.comparison.tables import write_csv
 from scripts.marks import table
-from scripts.metrics.row import digits
-from scripts.report.answer import ODOMETRY, against, answer, standing
+from scripts.metrics.table import digits
+from scripts.report.answer import ODOMETRY, against, answer, listed, standing
 from scripts.report.study import LEAST_RUNS
-from scripts.report.words import listed
 from scripts.result_files import write as write_results
 from slam.evaluation.lost import EXCUSED_S, LOST_RULE
 from slam.files import write_text
@@ -179,7 +178,9 @@ class Board:
     def _by_track(self, every: Sequence[Row]) -> list[str]:
         own = [row for row in every if row["counts"]]
         out = []
-        lost = sorted((r for r in own if math.isfinite(r["lost_from"])), key=_lost_from)
+        lost = sorted(
+            (r for r in own if math.isfinite(r["lost_from"])), key=lambda r: r["lost_from"]
+        )
         if lost:
             told = "; ".join(f"{r['track']} from level {_from(r)} on" for r in lost)
             out.append(f"`{self.subject}` is lost in half of the runs in {told}.")
@@ -341,10 +342,6 @@ _LOST = (
     f"above 1, and has no interval with fewer than {LEAST_RUNS} seeds. A track "
     "counts where an oracle is lost in at most a tenth of its runs, and at most 5 cm off."
 )
-
-
-def _lost_from(row: Row) -> float:
-    return float(row["lost_from"])
 
 
 def _from(row: Row) -> str:

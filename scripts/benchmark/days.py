@@ -14,7 +14,7 @@ from typing import Any
 
 from scripts import workers
 from scripts.benchmark.tracks import TEST, TRAIN
-from scripts.comparison.csv_files import write_csv
+from scripts.comparison.tables import write_csv
 from scripts.console import ended
 from scripts.days import buildings as lives
 from scripts.days import scores
@@ -89,13 +89,12 @@ def read(path: Path) -> list[Row]:
     if not isinstance(rows, dict) or not rows:
         raise LogFormatError(path, "no scores over days: it has no rows")
     try:
-        return [{k: _value(k, row[k]) for k in scores.COLUMNS} for row in rows.values()]
+        return [
+            {k: v if (v := row[k]) is None or k in _WORDS else float(v) for k in scores.COLUMNS}
+            for row in rows.values()
+        ]
     except (KeyError, TypeError, ValueError) as error:
         raise LogFormatError(path, f"no scores over days: {error!s:.80}") from error
-
-
-def _value(column: str, value: Any) -> Any:
-    return value if value is None or column in _WORDS else float(value)
 
 
 def section(rows: Sequence[Row], *, tables: bool = True) -> str:

@@ -18,7 +18,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark.submission import RUN, SHA256
+from scripts.benchmark.submission import MADE_WITH, RUN
 from scripts.benchmark.tracks import (
     FRESH,
     LEVELS,
@@ -32,7 +32,7 @@ from scripts.comparison.folder import read as compared
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
-from scripts.comparison.rules import MAX_DEPTH, Rule, check_keys, is_shallow, number
+from scripts.comparison.rules import Rule, check_keys, number
 from scripts.console import ended, note
 from scripts.machine import machine, versions
 from scripts.report.answer import ODOMETRY
@@ -171,16 +171,11 @@ def _short(value: Any) -> Any:
 
 _HEAD: Mapping[str, Rule] = {
     "columns": Rule(", ".join(COLUMNS), lambda value: value == list(COLUMNS)),
-    "made_with": Rule(
-        f"an object, at most {MAX_DEPTH} deep",
-        lambda value: isinstance(value, dict) and is_shallow(value),
-    ),
+    "made_with": MADE_WITH,
 }
 _CELLS: Mapping[str, Rule] = {**RUN, "lost": number(most=1.0, whole=True)}
 _RUN: Mapping[str, Rule] = {
-    "level": Rule(f"of {LEVELS}", lambda value: value in LEVELS),
-    "seed": RUN["seed"],
-    "recording": SHA256,
+    **{key: RUN[key] for key in ("level", "seed", "recording")},
     "slams": Rule(
         f"an object of up to {MAX_SLAMS}",
         lambda value: isinstance(value, dict) and len(value) <= MAX_SLAMS,

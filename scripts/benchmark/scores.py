@@ -156,7 +156,7 @@ def score(track: Track, slam: str, rows: Sequence[Row]) -> Row:
         SILENT: sum(silent) / len(silent) if silent else None,
         "spearman": spearman(drift_by_level(rows)),
         "spearman_ate": spearman(by_level(rows, ATE)),
-        **{cost: _median(_values(rows, cost)) for cost in COSTS},
+        **{cost: quantile(v, 0.5) if (v := _values(rows, cost)) else None for cost in COSTS},
     }
 
 
@@ -168,10 +168,6 @@ def _values(rows: Sequence[Row], metric: str) -> list[float]:
 def _by_seed(rows: Sequence[Row], metric: str) -> list[tuple[int, float]]:
     values = ((int(row["seed"]), row.get(metric)) for row in rows)
     return [(seed, float(v)) for seed, v in values if v is not None and not math.isnan(v)]
-
-
-def _median(values: Sequence[float]) -> float | None:
-    return quantile(values, 0.5) if values else None
 
 
 def fairness(track: Track, rows: Sequence[Row]) -> Row:
@@ -235,11 +231,14 @@ def ranking(runs: Mapping[str, Sequence[Row]], subject: str) -> list[Row]:
     same = sorted(run for run in made.get(subject, ()) if 2 * times[run] > len(made))
     of = [_ranked(slam, [(run, own[run]) for run in same])
           for slam, own in made.items() if same and own.keys() >= set(same)]  # fmt: skip
-    return sorted(of, key=lambda row: (-row["lost_from"], row["lost_runs"], _nearest(row)))
-
-
-def _nearest(row: Row) -> float:
-    return math.inf if row[TRACKING] is None else float(row[TRACKING])
+    return sorted(
+        of,
+        key=lambda row: (
+            -row["lost_from"],
+            row["lost_runs"],
+            math.inf if row[TRACKING] is None else row[TRACKING],
+        ),
+    )
 
 
 def _ranked(slam: str, runs: Sequence[tuple[tuple[str, float, int], Row]]) -> Row:

@@ -10,8 +10,9 @@ from __future__ import annotations
 import hashlib
 import json
 import re
-from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+import tempfile
+from collections.abc import Iterator, Mapping, Sequence
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
@@ -19,6 +20,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scripts.benchmark.tracks import LEVELS, TRACKS, check_known
+from scripts.comparison import recording
+from scripts.comparison.entry import Entry
 from scripts.comparison.rules import (
     MAX_DEPTH,
     MOST,
@@ -32,13 +35,16 @@ from scripts.comparison.rules import (
 from scripts.machine import machine, versions
 from scripts.metrics.table import METRICS
 from scripts.output import configs_of
+from scripts.report.answer import ODOMETRY
 from scripts.result_files import finite, load
 from sim.core.versions import WORLD, world_of
 from sim.recording.sums import check_vouched
+from sim.recording.verify import Finding
 from slam.checked import is_number
 from slam.errors import FAILURES, InvalidValueError, LogFormatError
 from slam.files import write_text
-from slam.frames import Float
+from slam.frames import BeamClass, Float
+from slam.guests import Limits, limited
 from slam.system import names as registered
 from slam.variants import ORACLE
 
@@ -231,11 +237,15 @@ def _runs(path: Path, track: str, runs: Any, wanted: set[tuple[float, int]]) -> 
 
 
 _SEED, _POSITIVE = number(most=MAX_SEED, whole=True), number(most=MOST)
-_LEVEL = Rule(f"of {LEVELS}", lambda value: is_number(value) and value in LEVELS)
+LEVEL = Rule(f"of {LEVELS}", lambda value: is_number(value) and value in LEVELS)
 SHA256 = Rule("a SHA-256", lambda value: isinstance(value, str) and bool(_DIGEST.fullmatch(value)))
 SEEDS = Rule(
     f"whole numbers, 0 to {MAX_SEED}",
     lambda value: many(_SEED).holds(value) and len(value) <= MAX_SEEDS,
+)
+MADE_WITH = Rule(
+    f"an object, at most {MAX_DEPTH} deep",
+    lambda value: isinstance(value, dict) and is_shallow(value),
 )
 _HEAD: Mapping[str, Rule] = {
     "slam": word(most=MAX_WORDS),
@@ -244,20 +254,17 @@ _HEAD: Mapping[str, Rule] = {
     "seeds": SEEDS,
     "levels": Rule(
         f"of {LEVELS}, rising",
-        lambda value: many(_LEVEL).holds(value) and list(value) == sorted(value),
+        lambda value: many(LEVEL).holds(value) and list(value) == sorted(value),
     ),
     "seconds": Rule(
         f"null, or up to {MAX_SECONDS:g}",
         lambda value: value is None or (value != 0 and number(most=MAX_SECONDS).holds(value)),
     ),
     "tracks": Rule("one or more", lambda value: isinstance(value, dict) and bool(value)),
-    "made_with": Rule(
-        f"an object, at most {MAX_DEPTH} deep",
-        lambda value: isinstance(value, dict) and is_shallow(value),
-    ),
+    "made_with": MADE_WITH,
 }
 RUN: Mapping[str, Rule] = {
-    "level": _LEVEL, "seed": _SEED, "recording": SHA256, "poses": SHA256,
+    "level": LEVEL, "seed": _SEED, "recording": SHA256, "poses": SHA256,
     "outcome": word(among=OUTCOMES), "failure": word(most=MAX_WORDS, optional=True),
     **{
         key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS
@@ -272,3 +279,76 @@ _LOST: Mapping[str, Rule] = {
     "lost": number(least=1.0, most=1.0, whole=True),
     "lost_at_s": Rule("null where it finished, and else not", lambda value: value is not None),
 }
+
+
+_TOLD = ("outcome", "ate_unaligned_m", "error_tracking_m")  # of a run with other poses
+
+
+def made_again(path: Path, count: int, seed: int = 0, slam: str | None = None) -> Iterator[Finding]:
+    """One finding for each of ``count`` runs, drawn by ``seed``; raises as ``submission.read``.
+
+    slam  runs on them too, by this name; None: only recordings are checked, no SLAM runs
+
+    A difference is no proof of anything with other versions or on another processor: then the
+    verdict is "cannot be checked here".
+    """
+    given = read(path)
+    if slam is not None:
+        limited(slam, Limits())  # what cannot start here is told before anything is simulated
+    runs = [(track, run) for track, own in given.runs.items() for run in own]
+    chosen = np.random.default_rng(seed).choice(len(runs), min(count, len(runs)), replace=False)
+    for track, run in (runs[k] for k in sorted(chosen.tolist())):
+        name = f"{path.name}: {track}, level {run['level']:g}, seed {run['seed']}"
+        with tempfile.TemporaryDirectory() as folder:
+            wrong, proven = _wrong(given, track, run, slam, Path(folder))
+        there = _elsewhere(given.made_with)
+        if not wrong:
+            yield Finding(episode=name, verdict="same bytes")
+        elif there and not proven:
+            why = f"{wrong}, and it was made with {there}"
+            yield Finding(episode=name, verdict="cannot be checked here", why=why)
+        else:
+            here = "" if there else ", on the same processor and versions"
+            why = f"{wrong}{here}"
+            yield Finding(episode=name, verdict="differs", why=why)
+
+
+def _wrong(
+    given: Submission, track: str, run: Mapping[str, Any], slam: str | None, folder: Path
+) -> tuple[str, bool]:
+    """What is others here, "" where nothing is, and whether no other machine can explain it."""
+    file = folder / "again.npz"
+    plan = TRACKS[track].plan(
+        (ODOMETRY,), (run["seed"],), levels=(float(run["level"]),), seconds=given.seconds
+    )
+    (one,) = plan.runs()
+    recording.record(file, every=plan.every, **asdict(plan.recipe(one)))
+    if recording.digest(file) != run["recording"]:
+        return "its scans are others here", False
+    if slam is None:
+        return "", False
+    drive = recording.load(file)
+    entry = Entry(slam, drive, Limits(hidden=(folder,)), judge_maps=False)
+    entry.over(drive.frames)
+    arrays = entry.arrays()
+    row = json.loads(arrays["row"])
+    if digest_of(arrays["stamps_ns"], arrays["poses"]) == run["poses"]:
+        row |= {"moving_share_of_returns": drive.share_of_returns(BeamClass.MOVING)}
+        wrong = [k for k in OF_POSES if finite(row.get(k)) != run[k]]
+        return (f"its {', '.join(wrong)} are not those of its poses" if wrong else ""), True
+    return f"its poses are others here ({_told(_TOLD, run)}; here {_told(_TOLD, row)})", False
+
+
+def _told(keys: Sequence[str], row: Mapping[str, Any]) -> str:
+    return ", ".join(f"{key} {row.get(key)!s:.12}" for key in keys)
+
+
+def _elsewhere(made_with: Mapping[str, Any]) -> str:
+    """Processor and versions that it was made with; "" where they are those of here."""
+    here = {"versions": versions(), "processor": machine()["processor"]}
+    told = made_with.get("machine")
+    there = {
+        "versions": made_with.get("versions"),
+        "processor": told.get("processor") if isinstance(told, Mapping) else None,
+    }
+    return "" if here == there else f"{there!s:.300}"

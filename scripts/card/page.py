@@ -3,35 +3,69 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
-from typing import NamedTuple
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from PIL import Image
 from rich.markup import escape
 from rich.table import Table
 
+from scripts.card.rows import HEADINGS, Bench, Row, box, only, post
+from scripts.figures import save, styled
 from scripts.marks import table, with_tables_apart
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.registry import DEFAULT, describe
 from sim.sensors.lidar.sheet import NOT_STATED
 from slam.files import make_folder, write_text
+from slam.frames import Float
 
-HEADINGS = ("", "what", "data sheet", "measured", "source")
-MARKS = {True: "✓", False: "✗"}
 STYLES = {"✓": "[green]✓[/green]", "✗": "[red]✗[/red]"}
-
-
-class Row(NamedTuple):
-    """One line of a card; ``kept`` whether what was measured agrees with the data sheet."""
-
-    what: str
-    datasheet: str
-    measured: str
-    source: str
-    kept: bool
-
-    def cells(self) -> tuple[str, ...]:
-        """Under ``HEADINGS``."""
-        return (MARKS[self.kept], *self[:4])
+RED, GREY = "#ce2c3c", "#8a8a8a"
+Window = tuple[float, float, float, float]
+_BACK = box(4.05, 0.0, 0.05, 2.5)
+# Name -> (MJCF, window of the picture: x from, x to, y from, y to in m).
+SCENES: Mapping[str, tuple[str, Window]] = {
+    "a white wall": (box(3.05, 0.0, 0.05, 2.5), (2.93, 3.07, -0.3, 0.3)),
+    "a black wall,\nseen along it": (
+        box(5.0, -1.05, 8.0, 0.05, "plastic_black"),
+        (-0.3, 10.0, -1.5, -0.5),
+    ),
+    "a corner, 0.5 m\nbefore a wall": (
+        box(3.25, 0.915, 0.25, 0.9) + box(3.55, 0.0, 0.05, 2.5),
+        (2.9, 3.6, -0.25, 0.25),
+    ),
+    "a chair's column,\n0.6 m before a wall": (
+        post(3.4, 0.0, 0.025, "metal") + _BACK,
+        (3.25, 4.12, -0.2, 0.2),
+    ),
+    "a person's legs": (
+        post(3.3, 0.13, 0.06, "trousers") + post(3.4, -0.1, 0.06, "trousers") + _BACK,
+        (3.1, 4.12, -0.3, 0.3),
+    ),
+    "a pane beside the\nway, walls ahead\nand behind it": (
+        box(2.25, -0.6, 2.75, 0.006, "glass")
+        + box(6.05, 0.7, 0.05, 1.3)
+        + box(2.0, -2.05, 4.0, 0.05),
+        (-0.7, 6.4, -2.4, 1.8),
+    ),
+}
+_SPOT = {"spot": True, "reflectivity": True}
+_SEEN = {**_SPOT, "incidence": True}
+# Those effects that need others to show come with them.
+COLUMNS: Mapping[str, Lms221Config] = {
+    "10 mm noise": only(noise_std_m=0.010),
+    "rounding (counter,\ncm mode)": only({"timer": True}, quantise=True),
+    "systematic error\nof one unit": only({"systematic": True}),
+    "spot, first pulse,\nreflectivity": only(_SPOT),
+    "spot ... +\nmixed pixels": only({**_SPOT, "mixed_pixels": True}),
+    "spot ... +\nincidence": only(_SEEN),
+    "spot ... + incidence,\nglass and bounce": only({**_SEEN, "glass": True, "bounce": True}),
+    "everything": Lms221Config(),
+}
+SCANS = 12
 
 
 def markdown(headings: Sequence[str], rows: Sequence[Sequence[str]]) -> list[str]:
@@ -125,3 +159,52 @@ NOTES = (
     "Not simulated: warm-up drift, dazzle by sunlight (`dropout_rate` stands in for it),",
     "a dirty window, two scanners that disturb each other.",
 )
+
+
+@styled({"font.size": 8, "grid.alpha": 0.3})
+def draw(path: Path) -> None:
+    """Write it as a PNG with a palette: of few colours, a third of the bytes."""
+    save(_ablation(), path)
+    with Image.open(path) as picture:
+        small = picture.convert("RGB").quantize(64, dither=Image.Dither.NONE)
+    small.save(path, optimize=True)
+
+
+def _ablation() -> Figure:
+    """Rows of scenes, columns of effects: ideal in grey, with the effects in red."""
+    figure = Figure(figsize=(13.0, 8.4), layout="constrained")
+    axes = figure.subplots(len(SCENES), len(COLUMNS), squeeze=False)
+    for row, (name, (world, window)) in enumerate(SCENES.items()):
+        ideal = _points(world, Lms221Config.ideal(), 1, 0)
+        for column, config in enumerate(COLUMNS.values()):
+            _panel(axes[row, column], ideal, _points(world, config, SCANS, 5), window)
+        axes[row, 0].set_ylabel(name, fontsize=8)
+    for column, title in enumerate(COLUMNS):
+        axes[0, column].set_title(title, fontsize=9)
+    figure.suptitle(
+        f"what the scanner shows: ideal (grey rings) and {SCANS} scans with effects (red); metres, "
+        "the scanner stands at (0, 0) and looks to the right",
+        fontsize=10,
+    )
+    return figure
+
+
+def _points(world: str, config: Lms221Config, scans: int, seed: int) -> Float:
+    """(n, 2) what the scans show, m in the frame of the laser."""
+    bench = Bench(world, config, seed)
+    ranges = bench.ranges(scans)
+    seen = np.isfinite(ranges)
+    angles = np.broadcast_to(bench.laser.spec.angles, ranges.shape)[seen]
+    shown: Float = ranges[seen][:, None] * np.column_stack((np.cos(angles), np.sin(angles)))
+    return shown
+
+
+def _panel(ax: Axes, ideal: Float, shown: Float, window: Window) -> None:
+    x0, x1, y0, y1 = window
+    inside = (shown[:, 0] > x0) & (shown[:, 0] < x1) & (shown[:, 1] > y0) & (shown[:, 1] < y1)
+    ax.plot(ideal[:, 0], ideal[:, 1], "o", ms=5, mfc="none", mec=GREY, mew=0.6)
+    ax.plot(shown[inside, 0], shown[inside, 1], ".", ms=3.5, color=RED, alpha=0.7, mew=0)
+    ax.set(xlim=(x0, x1), ylim=(y0, y1))
+    ax.tick_params(labelsize=6, length=2)
+    ax.grid(alpha=0.25)
+    ax.locator_params(nbins=4)

@@ -10,12 +10,12 @@ from __future__ import annotations
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace
+from typing import NamedTuple
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scripts.card.page import Row
 from sim.sensors.lidar.device import LaserScanner, ScanResult
 from sim.sensors.lidar.link import SerialLink
 from sim.sensors.lidar.models.lms221 import (
@@ -28,6 +28,8 @@ from sim.sensors.lidar.models.lms221 import (
 from sim.sensors.lidar.receiver import SignalModel
 from sim.sensors.lidar.registry import ScannerConfig
 
+HEADINGS = ("", "what", "data sheet", "measured", "source")
+MARKS = {True: "✓", False: "✗"}
 HEIGHT = 0.36
 NONE = RangeEffects.none()
 MATERIALS = ("wall", "paper", "rubber", "metal", "glass", "mirror", "trousers", "plastic_black")
@@ -42,6 +44,20 @@ _FRAME = """
   </worldbody>
 </mujoco>
 """
+
+
+class Row(NamedTuple):
+    """One line of a card; ``kept`` whether what was measured agrees with the data sheet."""
+
+    what: str
+    datasheet: str
+    measured: str
+    source: str
+    kept: bool
+
+    def cells(self) -> tuple[str, ...]:
+        """Under ``HEADINGS``."""
+        return (MARKS[self.kept], *self[:4])
 
 
 def box(x: float, y: float, half_x: float, half_y: float, material: str = "wall") -> str:

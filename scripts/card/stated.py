@@ -9,8 +9,7 @@ from fractions import Fraction
 
 import numpy as np
 
-from scripts.card.page import Row
-from scripts.card.rows import Bench, box, plate
+from scripts.card.rows import Bench, Row, box, plate
 from sim.sensors.lidar.registry import names, scanner_of
 from sim.sensors.lidar.scanner import Scanner, Spot
 from sim.sensors.lidar.sheet import QUANTITIES, Stated, sheet_of

@@ -4,28 +4,45 @@
 from __future__ import annotations
 
 import json
+from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+from matplotlib.axes import Axes
+from matplotlib.figure import Figure
+from matplotlib.lines import Line2D
 from rich.table import Table
 
+import scenes
 from scenes import registry
-from scripts.closed_loop import pictures, tables
-from scripts.closed_loop.folder import LEVELS, TABLE
+from scenes.scene import Scene
+from scripts import figures
+from scripts.closed_loop import tables
 from scripts.closed_loop.plan import RUNS, SCHEMA, Plan
-from scripts.closed_loop.runs import Driven, load
-from scripts.comparison.csv_files import write_checked, write_csv
+from scripts.closed_loop.runs import DrivenRun, load
+from scripts.closed_loop.tables import LEVELS, TABLE
+from scripts.comparison.tables import Row, write_checked, write_csv
 from scripts.console import level_table
+from scripts.figures import COLORS, color_of, save, styled
 from scripts.jobs import run_jobs, try_names
 from scripts.machine import machine
 from scripts.output import result_folder
+from sim.view.draw import Picture
+from sim.view.mapview import MapView
+from sim.world.world import World
 from slam.errors import UnknownNameError
 from slam.evaluation.lost import FOUND_RULE, LOST_RULE
 from slam.files import write_text
+from slam.frames import Float
+
+PX_PER_M = 40
+PALE = 0.35  # of the colour of what can move
+MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
 
 
-def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
+def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[Row]:
     """Drive what is missing, write tables and pictures; the rows of ``levels.csv``."""
     built = registry.build(plan.scene)  # wrong names are told before anything starts
     for name in plan.goals if isinstance(plan.goals, tuple) else ():
@@ -46,7 +63,7 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[dict[str, Any]]:
             return _write(staged, plan, runs)
 
 
-def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:
+def _write(out: Path, plan: Plan, runs: list[DrivenRun]) -> list[Row]:
     goals = [row for run in runs for row in tables.goal_rows(run)]
     rows = [tables.run_row(run) for run in runs]
     summary = tables.levels(goals, rows)
@@ -59,17 +76,17 @@ def _write(out: Path, plan: Plan, runs: list[Driven]) -> list[dict[str, Any]]:
     ]
     text = json.dumps({"schema": SCHEMA, "runs": whole}, indent=1, allow_nan=False)
     write_text(out / "runs.json", text + "\n")
-    pictures.curves(out / "closed_loop.png", summary, plan.axis)
+    curves(out / "closed_loop.png", summary, plan.axis)
     shown = dict.fromkeys((plan.levels[0], plan.levels[-1]))
     picked = [
         [r for r in runs if (r.identity["dynamism"], r.identity["seed"]) == (level, plan.seeds[0])]
         for level in shown
     ]
-    pictures.paths(out / "paths.png", picked, plan.axis)
+    paths(out / "paths.png", picked, plan.axis)
     return summary
 
 
-def said(plan: Plan, rows: list[dict[str, Any]]) -> list[str]:
+def said(plan: Plan, rows: list[Row]) -> list[str]:
     """Goals reached by each SLAM at the lowest and the highest level."""
     lines = []
     for level in dict.fromkeys((plan.levels[0], plan.levels[-1])):
@@ -79,7 +96,7 @@ def said(plan: Plan, rows: list[dict[str, Any]]) -> list[str]:
     return lines
 
 
-def success_table(plan: Plan, rows: list[dict[str, Any]]) -> Table:
+def success_table(plan: Plan, rows: list[Row]) -> Table:
     """Success and precision, to be printed."""
     at = {(row["dynamism"], row["slam"]): row for row in rows}
     title = f"{plan.scene}: goals reached, %; median precision, cm; runs lost"
@@ -90,6 +107,93 @@ def success_table(plan: Plan, rows: list[dict[str, Any]]) -> Table:
     )  # fmt: skip
 
 
-def _cell(row: dict[str, Any]) -> str:
+def _cell(row: Row) -> str:
     precise = "-" if row["precision_m"] is None else f"{100.0 * row['precision_m']:.0f}"
     return f"{100.0 * row['success']:.0f} %; {precise}; {row['runs_lost']} of {row['runs']}"
+
+
+@styled()
+def curves(path: Path, levels: Sequence[Row], axis: str = "dynamism") -> None:
+    """``closed_loop.png``: a panel each for success and precision, with 95 % intervals."""
+    scene, names = levels[0]["scene"], list(dict.fromkeys(row["slam"] for row in levels))
+    ticks = sorted({row["dynamism"] for row in levels})
+    figure = Figure(figsize=(10.0, 4.2))
+    panels = (
+        ("success", "goals reached, %", 100.0, 103.0),
+        ("precision_m", "distance to the goal when believed reached, m", 1.0, None),
+    )
+    for ax, (key, label, factor, top) in zip(figure.subplots(1, 2), panels, strict=True):
+        for name in names:
+            points = [
+                (row["dynamism"] + figures.apart(name, names, ticks),
+                 *(factor * row[f"{key}{end}"] for end in ("", "_low", "_high")))
+                for row in levels
+                if row["slam"] == name and row[key] is not None
+            ]  # fmt: skip
+            figures.line(ax, points, color_of(name, names), figures.marker(name, names), name)
+        figures.level_axis(ax, ticks, axis)
+        ax.set(ylim=(0.0, top), ylabel=label, title=f"{scene}: with 95 % intervals")
+    handles, labels = figure.axes[0].get_legend_handles_labels()
+    figure.legend(
+        handles, labels, loc="outside upper center", ncols=len(names), frameon=False, fontsize=9
+    )
+    save(figure, path)
+
+
+@styled({"axes.grid": False})
+def paths(path: Path, rows: Sequence[Sequence[DrivenRun]], axis: str = "dynamism") -> None:
+    """``paths.png``: runs as panels, true path over the room as it was at the start."""
+    first = rows[0][0].identity
+    scene = scenes.build(first["scene"], 0)
+    xmin, ymin, xmax, ymax = scene.bounds
+    wide = min(7.0, 20.0 / len(rows[0]))
+    high = wide * (ymax - ymin) / (xmax - xmin) + 0.5
+    figure = Figure(figsize=(wide * len(rows[0]), high * len(rows) + 0.4))
+    axes = np.atleast_2d(figure.subplots(len(rows), len(rows[0]), squeeze=False))
+    for r, runs in enumerate(rows):
+        world = World(runs[0].identity["scene"], seed=runs[0].identity["seed"], dynamism=0.0)
+        size = (round((xmax - xmin + 0.6) * PX_PER_M), round((ymax - ymin + 0.6) * PX_PER_M))
+        plan = MapView(world.scene, *size)
+        room = _room(plan, world.mover_poses())
+        for c, run in enumerate(runs):
+            _panel(axes[r, c], run, room, plan, world.scene)
+            who = run.identity
+            level = f"{axis} {who['dynamism']:g}"
+            axes[r, c].set_title(f"{who['slam']}, {level}, seed {who['seed']}", fontsize=9)
+    figure.legend(handles=_legend(), loc="outside lower center", ncols=7, frameon=False)
+    save(figure, path)
+
+
+def _room(view: MapView, poses: Float) -> Picture:
+    """What stays, and pale what may not: it stood there at the start, the robot drove later."""
+    still = view.draw(np.full_like(poses, np.nan)).astype(np.float64)
+    whole = view.draw(poses).astype(np.float64)
+    return np.round(still + PALE * (whole - still)).astype(np.uint8)
+
+
+def _panel(ax: Axes, run: DrivenRun, room: Any, plan: MapView, scene: Scene) -> None:
+    ax.imshow(room, interpolation="antialiased", alpha=0.75)
+    for name, dashes in (("believed", ":"), ("true", "-")):
+        if len(run.arrays[name]):
+            pixels = plan.to_pixels(run.arrays[name][:, :2].copy())
+            color = "#1f61be" if name == "believed" else COLORS["truth"]
+            ax.plot(pixels[:, 0], pixels[:, 1], dashes, color=color, lw=1.2)
+    for k, goal in enumerate(run.goals):
+        place = np.array([scene.goals[goal["goal"]]], dtype=np.float64)
+        x, y = plan.to_pixels(place)[0].tolist()
+        ax.plot(x, y, "o", color=MARKS[goal["outcome"]], ms=11, mec="white")
+        ax.text(x, y, str(k + 1), color="white", ha="center", va="center", fontsize=8)
+    ax.set(xlim=(0, room.shape[1]), ylim=(room.shape[0], 0))
+    ax.axis("off")
+
+
+def _legend() -> list[Line2D]:
+    lines = [
+        Line2D([], [], color=COLORS["truth"], label="true path"),
+        Line2D([], [], color="#1f61be", ls=":", label="believed path"),
+    ]
+    lines += [Line2D([], [], ls="", label="pale: what can move, at the start")]
+    return lines + [
+        Line2D([], [], color=color, marker="o", ls="", label=outcome)
+        for outcome, color in MARKS.items()
+    ]

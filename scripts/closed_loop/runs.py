@@ -75,7 +75,7 @@ def save(path: Path, run: LoopRun) -> None:
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Driven:
+class DrivenRun:
     """A run read back: who and where, goals and the rest as ``LoopRun`` has them, arrays."""
 
     identity: Mapping[str, Any]
@@ -84,11 +84,11 @@ class Driven:
     arrays: Mapping[str, Any]
 
 
-def load(path: Path, identity: Mapping[str, Any]) -> Driven:
+def load(path: Path, identity: Mapping[str, Any]) -> DrivenRun:
     """What ``save`` wrote; ``LogFormatError`` for anything else."""
     arrays = read_arrays(path, (*_ARRAYS, "rest"))
     try:
         rest = json.loads(arrays.pop("rest").item())
-        return Driven(identity=identity, goals=rest.pop("goals"), rest=rest, arrays=arrays)
+        return DrivenRun(identity=identity, goals=rest.pop("goals"), rest=rest, arrays=arrays)
     except (ValueError, TypeError, KeyError, AttributeError) as error:
         raise LogFormatError(path, f"no run of a drive: {error}") from error

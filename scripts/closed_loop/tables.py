@@ -1,20 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From runs to ``goals.csv``, ``runs.csv`` and ``levels.csv``."""
+"""From runs to ``goals.csv``, ``runs.csv`` and ``levels.csv``, and how a report reads them back."""
 
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from dataclasses import dataclass
+from pathlib import Path
 from typing import Any
 
 import numpy as np
 
-from scripts.closed_loop.plan import IDENTITY
-from scripts.closed_loop.runs import Driven
-from scripts.comparison.tables import grouped
+from scripts.closed_loop.plan import IDENTITY, SCHEMA
+from scripts.closed_loop.runs import DrivenRun
+from scripts.comparison.folder import axis_in, check_recipe
+from scripts.comparison.rules import Columns, Rule, Table, check_keys, named, number, word
+from scripts.comparison.tables import Row, grouped, read_csv
+from scripts.output import RECIPE, check_whole
+from slam.errors import LogFormatError
 from slam.evaluation.statistics import median_interval, quantile, share_interval
 
-Row = dict[str, Any]
 OUTCOMES = ("reached", "wrong", "given up", "failed")
 GOAL_COLUMNS = (
     *IDENTITY, "order", "goal", "outcome", "reason", "precision_m", "precision_rad", "time_s",
@@ -26,15 +31,9 @@ RUN_COLUMNS = (
     "near_misses", "ate_m", "lost_s", "recovered", "recovered_s", "not_trusted_share", "failure",
     "failure_words",
 )  # fmt: skip
-LEVEL_COLUMNS = (
-    "scene", "dynamism", "slam", "runs", "goals", "reached", "success", "success_low",
-    "success_high", "wrong", "given_up", "failed", "given_up_taken", "precision_m",
-    "precision_m_low", "precision_m_high", "precision_rad", "time_s", "collisions_per_km",
-    "near_misses_per_km", "runs_lost", "runs_recovered",
-)  # fmt: skip
 
 
-def goal_rows(run: Driven) -> list[Row]:
+def goal_rows(run: DrivenRun) -> list[Row]:
     """A row for each goal."""
     rows = []
     for order, goal in enumerate(run.goals):
@@ -49,7 +48,7 @@ def goal_rows(run: Driven) -> list[Row]:
     return rows
 
 
-def run_row(run: Driven) -> Row:
+def run_row(run: DrivenRun) -> Row:
     """A row for a whole run; precisions are medians over the goals believed reached."""
     goals, offset = goal_rows(run), run.arrays["believed"] - run.arrays["true"]
     squared = offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1]
@@ -106,3 +105,84 @@ def _level(key: tuple[Any, ...], goals: list[Row], runs: list[Row]) -> Row:
         "runs_lost": sum(r["lost_s"] is not None for r in runs),
         "runs_recovered": sum(r["recovered"] == 1 for r in runs),
     }  # fmt: skip
+
+
+LEVELS = "levels.csv"
+_COUNT, _SHARE = number(most=1e9, whole=True), number(most=1.0)
+_SOME = number(least=1.0, most=1e9, whole=True)
+_MAYBE = number(optional=True)
+_COLUMNS: Columns = {
+    "scene": word(), "dynamism": _SHARE, "slam": word(), "runs": _SOME, "goals": _SOME,
+    "reached": _COUNT, "success": _SHARE, "success_low": _SHARE, "success_high": _SHARE,
+    "wrong": _COUNT, "given_up": _COUNT, "failed": _COUNT, "given_up_taken": _COUNT,
+    **dict.fromkeys(
+        ("precision_m", "precision_m_low", "precision_m_high", "precision_rad", "time_s",
+         "collisions_per_km", "near_misses_per_km"), _MAYBE,
+    ),
+    "runs_lost": _COUNT, "runs_recovered": _COUNT,
+}  # fmt: skip
+TABLE = Table(
+    columns=_COLUMNS, key=("scene", "dynamism", "slam"),
+    parts=(
+        *((outcome, "goals") for outcome in ("reached", "wrong", "given_up", "failed")),
+        ("runs_lost", "runs"), ("runs_recovered", "runs_lost"),
+    ),
+)  # fmt: skip
+"""``levels.csv``."""
+_RECIPE: Mapping[str, Rule] = {"command": word(among=("drive",)), "settings": named({})}
+_LOOP = named({"tolerance_m": number(most=1e9), "plan_on": word(among=("layout", "map"))})
+
+
+@dataclass(frozen=True, kw_only=True)
+class Driven:
+    """The folder of a drive: its recipe's settings and the rows of its ``levels.csv``."""
+
+    settings: dict[str, Any]
+    rows: list[Row]
+
+    @property
+    def scene(self) -> str:
+        """A drive has one."""
+        return str(self.rows[0]["scene"])
+
+    @property
+    def slams(self) -> list[str]:
+        """In the order in which they were named."""
+        return list(dict.fromkeys(str(row["slam"]) for row in self.rows))
+
+    @property
+    def axis(self) -> str:
+        """What the levels are of."""
+        return str(self.settings.get("axis", "dynamism"))
+
+    @property
+    def levels(self) -> list[float]:
+        """Of that axis, ascending."""
+        return sorted({float(row["dynamism"]) for row in self.rows})
+
+    def of(self, slam: str) -> list[Row]:
+        """A SLAM's rows."""
+        return [row for row in self.rows if row["slam"] == slam]
+
+
+def driven(folder: Path, *, vouched: bool = False) -> Driven:
+    """A drive on file; ``LogFormatError`` for a folder that holds none.
+
+    vouched  the hashes of its files have been checked
+    """
+    check_whole(folder)
+    path = folder / RECIPE
+    settings = check_recipe(path, _RECIPE)["settings"]
+    if settings.get("drive_schema") != SCHEMA:
+        got = f"settings.drive_schema is {settings.get('drive_schema')!r:.80}"
+        raise LogFormatError(folder, f"no closed-loop drive of schema {SCHEMA}: {got}")
+    check_keys(path, "settings.", settings, {"loop": _LOOP})
+    rows = read_csv(folder / LEVELS, TABLE, axis_in(settings, path), vouched=vouched)
+    if not rows:
+        raise LogFormatError(folder / LEVELS, "a table without rows")
+    return Driven(settings=settings, rows=rows)
+
+
+def drives_in(folder: Path) -> list[Path]:
+    """The folders of drives within that of a comparison, which a report shows unasked."""
+    return sorted(path for path in folder.glob("drive*") if path.is_dir())

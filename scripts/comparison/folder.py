@@ -20,7 +20,6 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.csv_files import Row, read_csv, write_checked
 from scripts.comparison.plan import Run
 from scripts.comparison.rules import PLAIN, Rule, check_keys
 from scripts.comparison.run_file import RunFile
@@ -36,6 +35,7 @@ from scripts.comparison.schema import (
     TABLES,
     settings,
 )
+from scripts.comparison.tables import Row, read_csv, write_checked
 from scripts.names import RUNS as RUN_FILES
 from scripts.options import AXES
 from scripts.output import RECIPE as RECIPE_FILE
@@ -142,15 +142,13 @@ class Compared:
             for column, values in known.items():
                 # Seeds of buildings are those of the runs; a building has no level.
                 if column in row and row[column] not in values:
+                    named = self.axis if column == "dynamism" else column
                     raise LogFormatError(
                         path,
-                        f"row {number}: column {self._on_file(column)!r} must be one of "
-                        f"settings.{_NAMED[column]} of the recipe, got {row[column]!r:.80}",
+                        f"row {number}: column {named!r} must be one of settings.{_NAMED[column]} "
+                        f"of the recipe, got {row[column]!r:.80}",
                     )
         return rows
-
-    def _on_file(self, column: str) -> str:
-        return self.axis if column == "dynamism" else column
 
     def names(self) -> list[str]:
         """Of the files of ``runs/``, without their ending."""

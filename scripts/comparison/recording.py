@@ -77,7 +77,8 @@ def record(path: Path, *, every: int, **recipe: Any) -> None:
         rows.append(_row(moment, mover, labels.kind))
     truth_map = scene.static_map
     arrays: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    arrays |= _spec_arrays(simulation.spec)
+    told = (*_SPEC, *_SPEC_LATER, *_SPEC_ARRAYS)
+    arrays |= {f"laser_{name}": getattr(simulation.spec, name) for name in told}
     np.savez_compressed(
         path,
         **arrays,
@@ -117,10 +118,6 @@ def _row(moment: Moment, mover: NDArray[np.int64], kind: NDArray[np.uint8]) -> d
         "mover_poses": moment.poses,
         "moving": moment.moving,
     }
-
-
-def _spec_arrays(spec: LaserSpec) -> dict[str, Any]:
-    return {f"laser_{name}": getattr(spec, name) for name in (*_SPEC, *_SPEC_LATER, *_SPEC_ARRAYS)}
 
 
 def load(path: Path) -> Recording:

@@ -37,7 +37,8 @@ def merge(path: Path, recording: Path, entries: Mapping[str, Path]) -> list[dict
         arrays |= {f"slam{k}_{name}": value for name, value in own.items()}
     arrays["slams"] = np.array(list(entries))
     arrays["schema"] = np.array(SCHEMA)
-    check_run(path, arrays)
+    headers = {name: Header(array.shape, array.dtype) for name, array in arrays.items()}
+    _check_values(path, arrays, _wanted(path, headers))
     with replacing(path) as temporary:
         np.savez_compressed(temporary, **arrays)
     return rows
@@ -51,12 +52,6 @@ def _row(entry: Path, text: Any) -> dict[str, Any]:
     if not isinstance(row, dict):
         raise LogFormatError(entry, "no entry of a comparison: its row is no object")
     return row
-
-
-def check_run(path: Path, arrays: Arrays) -> None:
-    """``LogFormatError`` unless these are the arrays of a run, which ``path`` is to hold."""
-    headers = {name: Header(array.shape, array.dtype) for name, array in arrays.items()}
-    _check_values(path, arrays, _wanted(path, headers))
 
 
 def _read_run(path: Path) -> dict[str, NDArray[Any]]:

@@ -27,7 +27,6 @@ from scripts.comparison.rules import (
     number,
     word,
 )
-from scripts.metrics.row import Metric
 from scripts.metrics.table import COLUMNS as MEASURED
 from scripts.metrics.table import METRICS
 from scripts.options import AXES
@@ -56,15 +55,14 @@ _MAYBE_ONE = number(most=1.0, whole=True, optional=True)
 _FAILURE = word(most=MAX_MESSAGE, optional=True)
 
 
-def _measured(metric: Metric) -> Rule:
-    return number(least=metric.least, most=metric.most, whole=metric.whole, optional=True)
-
-
 # "dynamism" is the level, of whatever axis: a table over motion or change calls it so on file.
 _RUNS: Columns = {
     "scene": _NAME, "dynamism": level_of("dynamism"), "seed": _SEED, "slam": _NAME,
     "outcome": word(among=OUTCOMES), "failure": _FAILURE, "scans": _COUNT,
-    **{key: _measured(METRICS[key]) for key in MEASURED},
+    **{
+        key: number(least=of.least, most=of.most, whole=of.whole, optional=True)
+        for key, of in METRICS.items() if key in MEASURED
+    },
     "lost": number(most=1.0, whole=True),
 }  # fmt: skip
 _SUMMARY: Columns = {

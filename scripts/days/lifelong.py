@@ -14,10 +14,9 @@ from typing import Any
 import numpy as np
 
 from scripts.comparison.entry import whole_result
-from scripts.comparison.maps import NEAR_M, Believed, StaticDistance
+from scripts.comparison.maps import NEAR_M, Believed, StaticDistance, clearance, seen_empty
 from scripts.comparison.recording import Recording
-from scripts.comparison.sight import clearance, seen_empty
-from scripts.days import ages
+from scripts.days import truth
 from scripts.days.sessions import Drive, loaded
 from scripts.days.truth import Still, stands_there, still_things
 from scripts.names import file_name
@@ -54,7 +53,7 @@ class Building:
     T_map_world the frame of the first session's map; None before, or without truth
     snapshots   what each session that fitted saw, by its number
     copies      its map after each of them, where maps of some age are asked for
-    aged        rows (``ages.COLUMNS``) of the last session in older maps
+    aged        rows (``truth.AGE_COLUMNS``) of the last session in older maps
     before      the last session that was merged, where it was simulated
     limits      of a SLAM from outside, which then runs in a process of its own; None: here
     failures    what was said when it failed, in order
@@ -86,22 +85,18 @@ def started(names: Sequence[str], folder: Path, limits: Limits | None = None) ->
         Building(
             name=name,
             map=folder / f"map_{file_name(name)}.npz",
-            anew=(limits is not None and ":" in name) or not _has_days(create(name)),
+            anew=(limits is not None and ":" in name) or not isinstance(create(name), Tracker),
             limits=limits,
         )
         for name in names
     ]
 
 
-def _has_days(system: SlamSystem) -> bool:
-    return isinstance(system, Tracker)
-
-
 def lived(
     buildings: Sequence[Building], drives: Iterator[Drive]
 ) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
     """A row (``COLUMNS``) for each session and SLAM, and those of the last session in older maps
-    (``ages.COLUMNS``).
+    (``truth.AGE_COLUMNS``).
     """
     rows, aged = [], []
     for drive in drives:
@@ -137,7 +132,7 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     written = keep(session, building.map)
     if state.fits:
         building.snapshots[drive.number] = session.known().sessions[-1]
-        building.copies[drive.number] = ages.keep_copy(
+        building.copies[drive.number] = truth.keep_copy(
             building.map, building.map.parent / "maps", drive.number
         )
     row["map"] = "new" if first else "merged" if state.fits else written.name
@@ -149,22 +144,22 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
     if state.found_after_s is not None:
         row |= _map_scores(building.T_map_world, drive, track)
         if building.before is not None and drive.recording is not None:
-            shares = ages.changed_share(building.before, drive.recording)
-            row |= ages.verdicts(track.estimates, shares, searched)
+            shares = truth.changed_share(building.before, drive.recording)
+            row |= truth.verdicts(track.estimates, shares, searched)
     if state.fits:  # else the map knows nothing of it
         building.before = drive.recording
     return row
 
 
 def _age_rows(building: Building, drive: Drive) -> Iterator[dict[str, Any]]:
-    """Of that session in maps some sessions old (``ages.AGES``); none of them is written to."""
+    """Of that session in maps some sessions old; none of them is written to."""
     kept = sorted(building.copies)
-    for age, number in ages.ages_of(kept, drive.number):
+    for age, number in truth.ages_of(kept, drive.number):
         kind = type(create(building.name))
         assert issubclass(kind, Tracker)
         session = Session.open(building.copies[number], kind, time_s=drive.time_s)
         track = Track(building.name, session)
-        row: dict[str, Any] = dict.fromkeys(ages.COLUMNS)
+        row: dict[str, Any] = dict.fromkeys(truth.AGE_COLUMNS)
         row |= {"slam": building.name, "age": age, "session": drive.number}
         if track.survive(drive.frames) is not None:
             yield row | {"place": "failed"}
@@ -300,7 +295,7 @@ def live(
     path: Path, *, sessions: Sequence[str], slam: str, scan_limit_s: float = Limits.scan_s
 ) -> None:
     """A job: let ``slam`` live through the recordings ``sessions`` (beside ``path``'s folder), and
-    write its rows (``COLUMNS``, ``ages.COLUMNS``) to ``path`` as JSON.
+    write its rows (``COLUMNS``, ``truth.AGE_COLUMNS``) to ``path`` as JSON.
 
     Its maps are not kept. A SLAM from outside runs in a process of its own for each session; one
     that fails, even at its start, is a row.

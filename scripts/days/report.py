@@ -20,7 +20,7 @@ from scripts.days.lifelong import Building
 from scripts.days.sessions import Drive
 from scripts.days.truth import LEAST_M, ChangeScore, changed_spots, scored
 from scripts.figures import save, styled
-from scripts.metrics.row import minus
+from scripts.metrics.table import minus
 from scripts.pages.page import Part
 from sim.recording.tables import table
 from slam.days.changes import Change, between

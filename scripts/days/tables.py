@@ -12,10 +12,10 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
+from scripts.comparison.tables import write_csv
 from scripts.console import plain_table
-from scripts.days.ages import COLUMNS as AGE_COLUMNS
 from scripts.days.lifelong import COLUMNS
-from sim.recording.tables import table
+from scripts.days.truth import AGE_COLUMNS
 from slam.files import write_text
 
 Row = Mapping[str, Any]
@@ -83,8 +83,7 @@ def write(
 
     ``score``: what of the changes is true (``report.changes_of``).
     """
-    cells = [[words_exactly(row[column]) for column in COLUMNS] for row in rows]
-    write_text(folder / "lifelong.csv", table(COLUMNS, cells))
+    write_csv(folder / "lifelong.csv", rows, COLUMNS)
     whole = {
         "schema": 1,
         "settings": dict(settings),
@@ -94,13 +93,7 @@ def write(
     }
     write_text(folder / "lifelong.json", json.dumps(whole, indent=2) + "\n")
     if aged:
-        old = [[words_exactly(row[column]) for column in AGE_COLUMNS] for row in aged]
-        write_text(folder / "ages.csv", table(AGE_COLUMNS, old))
-
-
-def words_exactly(value: object) -> str:
-    """A field of the CSV: numbers with all that they hold."""
-    return "" if value is None else repr(value) if isinstance(value, float) else str(value)
+        write_csv(folder / "ages.csv", aged, AGE_COLUMNS)
 
 
 def ages_table(aged: Sequence[Row]) -> Table:

@@ -10,20 +10,26 @@ met by beams, and whose place the other session saw.
 from __future__ import annotations
 
 import math
-from collections.abc import Sequence
+import shutil
+from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
+from pathlib import Path
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.kinds import is_door
+from scripts.comparison.maps import Sight
 from scripts.comparison.recording import Recording
-from scripts.comparison.sight import Sight
+from scripts.comparison.schema import OLD as AGES
 from slam import se2
 from slam.days.changes import Change
 from slam.days.evidence import Snapshot
 from slam.days.history import dense
-from slam.frames import Float
+from slam.estimate import Estimate
+from slam.frames import NS_PER_S, Float
+from slam.tracker.belief.status import Status
 
 STILL_M, STILL_RAD = 0.1, 0.15  # of its commonest pose, a thing stands still there
 STILL_SHARE = 0.6  # of the scans at which it must; else it has no place in that session
@@ -37,6 +43,9 @@ SEEN_SHARE = 0.5  # of a thing's place that the other session must have seen
 HIT_M = 0.45  # a listed place this near to a true one is it
 _OUTSIDE_M = 500.0  # what is out of the building lies farther away
 _UNCOUNTED = "robot"
+NEWS_S = 2.0  # after which the map has learnt what it saw
+CLEARLY, HARDLY = 0.1, 0.01  # share of a scan's beams that what changed has met or let pass
+AGE_COLUMNS = ("slam", "age", "session", "found_after_s", "place", "rmse_m", "worst_m", "tracked")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -168,7 +177,10 @@ def changed_spots(
             seen = len(thing.points) >= SEEN_BEAMS
             seen &= _seen_share(snapshots[other], at, 0.5 * size, cell_m) >= SEEN_SHARE
             rest = [t for t in places[other] if t.name != thing.name and t.share >= STILL_SHARE]
-            asked = size >= LEAST_M and not any(_covers(one, thing) for one in rest)
+            asked = size >= LEAST_M and not any(
+                math.dist(one.middle(), thing.middle()) < one.radius_m + 0.5 * thing.radius_m
+                for one in rest
+            )
             asked &= thing.share >= STILL_SHARE
             if later:
                 asked &= later[0].share >= STILL_SHARE
@@ -208,10 +220,6 @@ def _elsewhere(one: Still, other: Still, least_m: float, least_rad: float) -> bo
     if is_door(one.kind) and abs(se2.wrap(one.pose[2] - other.pose[2])) > least_rad:
         return True
     return math.dist(one.pose[:2], other.pose[:2]) > least_m
-
-
-def _covers(one: Still, spot: Still) -> bool:
-    return math.dist(one.middle(), spot.middle()) < one.radius_m + 0.5 * spot.radius_m
 
 
 def _seen_share(snapshot: Snapshot, at: Float, radius_m: float, cell_m: float) -> float:
@@ -283,3 +291,70 @@ def _is_one(before: Sequence[Spot], after: Sequence[Spot], *, door: bool) -> boo
     """Whether the same thing went from one place and came to the other."""
     went = {t.name for t in before if not t.came and t.door == door}
     return bool(went & {t.name for t in after if t.came and t.door == door})
+
+
+def keep_copy(map_file: Path, folder: Path, number: int) -> Path:
+    """The map as it is after that session."""
+    folder.mkdir(parents=True, exist_ok=True)
+    return Path(shutil.copyfile(map_file, folder / f"{map_file.stem}_{number}.npz"))
+
+
+def ages_of(copies: Sequence[int], number: int) -> Iterator[tuple[int, int]]:
+    """(age, session after which the map was kept) for a session of that number, of ``AGES``.
+
+    A map that is kept apart from a session is missing: the one before is older than its age says.
+    """
+    for age in AGES:
+        before = [k for k in copies if k <= number - age]
+        if number - age >= 0 and before:
+            yield age, max(before)
+
+
+def changed_share(before: Recording, now: Recording) -> Float:
+    """(scans,) share of the beams with a return that met a thing where it did not stand in the
+    session ``before``, or passed through the place that one has left; each while it is news, for
+    ``NEWS_S`` from its first beam on. Then the map has learnt it.
+    """
+    old, new = still_things(before), still_things(now)
+    came = [thing for thing in new if moved_since(thing, old)]
+    went = [thing for thing in old if moved_since(thing, new)]
+    first_ns: dict[int, int] = {}
+    shares = np.zeros(len(now.frames))
+    for k, frame in enumerate(now.frames):
+        sight = Sight(now, k)
+        returned: NDArray[np.bool_] = np.asarray(np.isfinite(sight.points).all(axis=1))
+        news: NDArray[np.bool_] = np.zeros(len(returned), dtype=np.bool_)
+        beams = [now.hit[k] == t.row for t in came] + [_passed(sight, t) for t in went]
+        for number, met in enumerate(beams):
+            if met.any():
+                since = first_ns.setdefault(number, frame.stamp_ns)
+                if frame.stamp_ns - since <= NEWS_S * NS_PER_S:
+                    news = news | (met & returned)
+        shares[k] = news.sum() / max(returned.sum(), 1)
+    return shares
+
+
+def _passed(sight: Sight, thing: Still) -> NDArray[np.bool_]:
+    """(beams,) which went through where a thing stood, and beyond."""
+    away = sight.points - sight.eye
+    length = np.hypot(away[:, 0], away[:, 1])
+    to = np.array(thing.middle()) - sight.eye
+    radius = thing.radius_m * (0.5 if is_door(thing.kind) else 1.0)
+    with np.errstate(invalid="ignore", divide="ignore"):
+        along = away @ to / length
+        aside = np.abs(away[:, 0] * to[1] - away[:, 1] * to[0]) / length
+        met = (aside < radius) & (along > 0.0) & (length > math.hypot(*to) + radius)
+    return np.asarray(met, dtype=np.bool_)
+
+
+def verdicts(estimates: Sequence[Estimate], shares: Float, first: int) -> dict[str, Any]:
+    """From scan ``first`` on: how often "map outdated here" is said where the room clearly changed,
+    and where it hardly did; None without such scans.
+    """
+    said = np.array([e.diagnostics.get("verdict") == Status.OUTDATED for e in estimates])[first:]
+    shares = shares[first:]
+    clearly, hardly = shares >= CLEARLY, shares < HARDLY
+    return {
+        "outdated_told": float(said[clearly].mean()) if clearly.any() else None,
+        "outdated_false": float(said[hardly].mean()) if hardly.any() else None,
+    }

@@ -16,10 +16,9 @@ from scenes import groups
 from scripts import interrupt
 from scripts.console import note, progress
 from scripts.debugger.counterfactual import Inquest, hold
-from scripts.debugger.episode import Case
 from scripts.debugger.picture import blame_picture
 from scripts.debugger.question import Question
-from scripts.debugger.recording import Tape, record, simulate
+from scripts.debugger.recording import Case, Tape, record, simulate
 from scripts.debugger.words import as_json
 from scripts.output import whole_folder, write_recipe
 from slam.files import write_text

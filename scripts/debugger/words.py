@@ -42,7 +42,9 @@ def headline(found: Inquest) -> tuple[str, str]:
         return f"Nothing to explain {at}", f"{up}: less than a re-run could be told by."
     sure = f"{up}; with other noise again in {found.recurs} of {question.repeats}."
     if verdict in ("culprit", "several"):
-        return _named(found) + ("" if found.firm else ", weakly"), sure + _how_firm(found)
+        return _named(found) + (
+            "" if found.firm else ", weakly"
+        ), f"{sure} Cured in {found.named[0].again} of {question.repeats}."
     if verdict == "undecided":
         why = (
             "with other noise it does not happen"
@@ -86,11 +88,6 @@ def who(trial: Trial) -> str:
     return str(trial.change)
 
 
-def _how_firm(found: Inquest) -> str:
-    again = found.named[0].again
-    return f" Cured in {again} of {found.question.repeats}."
-
-
 def table(found: Inquest) -> Table:
     """One row for each re-run, the best first."""
     shown = Table(title=escape(headline(found)[0]), title_justify="left")
@@ -101,7 +98,9 @@ def table(found: Inquest) -> Table:
     seen = {s.name: s for s in found.suspects}
     shown.add_row("nothing", "", "", f"{found.rise_m:.2f}", "", "", "as it was")
     order = {"all": 0, "group": 1, "single": 2, "pair": 3}
-    for trial in sorted(found.trials, key=lambda t: (order[t.kind], -_or_last(t.share))):
+    for trial in sorted(
+        found.trials, key=lambda t: (order[t.kind], math.inf if math.isnan(t.share) else -t.share)
+    ):
         names = trial.change.out or trial.change.frozen
         sighting = seen.get(names[0]) if trial.kind == "single" else None
         shown.add_row(
@@ -114,10 +113,6 @@ def table(found: Inquest) -> Table:
             _word(found, trial),
         )
     return shown
-
-
-def _or_last(share: float) -> float:
-    return -math.inf if math.isnan(share) else share
 
 
 def _word(found: Inquest, trial: Trial) -> str:

@@ -201,7 +201,11 @@ class Study:
         rows = self.rows(self.cases(wanted), wanted.folder, wanted.jobs)
         told = self.told.format(world=WORLD, **vars(wanted))
         text = f"{told}\n\n{self.markdown(rows)}"
-        write(wanted.results, first, {"runs": {self._key(row): row for row in rows}})
+        write(
+            wanted.results,
+            first,
+            {"runs": {" ".join(str(row[k]) for k in (*self.axes, "seed")): row for row in rows}},
+        )
         if not wanted.no_page:
             fill_page(wanted.page, self.name, text)
         print(text)
@@ -238,9 +242,6 @@ class Study:
             suffix=".json",
             code=(*sources(slam, sim, scenes), *_scripts(module), *self.data(case)),
         )
-
-    def _key(self, row: Row) -> str:
-        return " ".join(str(row[key]) for key in (*self.axes, "seed"))
 
     def markdown(self, rows: Sequence[Row]) -> str:
         """The table."""

@@ -10,7 +10,7 @@ from collections.abc import Mapping, Sequence
 import cv2
 import numpy as np
 
-from scripts.film.layout import Box
+from scripts.film.panes import Box
 from sim.events import KIDNAP, NEAR_M, Event
 from sim.view import draw
 from sim.view.draw import Color, Picture

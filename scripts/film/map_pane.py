@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The pane of the map: what a SLAM believes, where it thinks it is, and where it truly is."""
+"""The panes of the map, of its last centimetres, and of a log's scan."""
 
 from __future__ import annotations
 
@@ -13,13 +13,17 @@ from numpy.typing import NDArray
 from sim.view import draw
 from sim.view.draw import Color, Picture, View
 from sim.view.moment import SIGMAS, Path
+from sim.view.scans import FAN, beams
 from slam import se2
 from slam.estimate import Landmarks, Raster
-from slam.frames import Float
+from slam.frames import Float, Frame
 
 FOLLOW_M = 9.0  # around the path, in a view that follows it
 STEP_M = 4.0  # such a view grows in steps: a sliding picture is hard to watch
 STEP_SHARE = 0.1  # of a large view: so that it is drawn again a few dozen times, however large
+_RADII_M = tuple(step * 10.0**k for k in range(-2, 3) for step in (1.0, 2.0, 5.0))
+MOST_M = 80.0  # of what is shown
+_FRONT_UP = np.array([0.0, 0.0, math.pi / 2.0])
 
 
 def _activity_colors() -> Picture:
@@ -151,3 +155,101 @@ class MapPane:
         step = max(STEP_M, draw.round_down(STEP_SHARE * float((high - low).max())))
         low, high = np.floor(low / step) * step, np.ceil(high / step) * step
         return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+class CloseUp:
+    """Paints what lies around the estimate, in the directions of the map pane.
+
+    The circle of sight grows at once where the truth or the ellipse would leave it, and shrinks
+    when a much smaller one would do.
+    """
+
+    def __init__(self, size: tuple[int, int], unit: float, color: Color) -> None:
+        self._size, self._unit, self._color = size, unit, color
+        self._radius = _RADII_M[0]
+
+    def paint(self, T_view_robot: Float, T_view_truth: Float | None, covariance: Float) -> Picture:
+        """A fresh picture; ``covariance`` (2, 2) m^2 in the frame of the view."""
+        width, height = self._size
+        reach = 1.15 * SIGMAS * math.sqrt(max(float(np.trace(covariance)), 0.0))
+        if T_view_truth is not None:
+            reach = max(reach, 1.25 * math.dist(T_view_robot[:2], T_view_truth[:2]))
+        self._radius = _grown(self._radius, reach)
+        x, y = T_view_robot[:2].tolist()
+        view = View.fitting(
+            (x - self._radius, y - self._radius, x + self._radius, y + self._radius), width, height
+        )
+        picture: Picture = np.full((height, width, 3), 255, np.uint8)
+        for k in (1, 2, 3):
+            x, y = round(width * k / 4), round(height * k / 4)
+            cv2.line(picture, (x, 0), (x, height), draw.GRID, 1)
+            cv2.line(picture, (0, y), (width, y), draw.GRID, 1)
+        draw.scale_bar(picture, view, self._unit)
+        if T_view_truth is not None:
+            self._arrow(picture, view, T_view_truth, draw.GREEN)
+        draw_ellipse(picture, view, T_view_robot, covariance, self._color)
+        self._arrow(picture, view, T_view_robot, self._color)
+        cv2.rectangle(picture, (0, 0), (width - 1, height - 1), draw.GRID, 1)
+        return picture
+
+    def _arrow(self, picture: Picture, view: View, T_view_robot: Float, color: Color) -> None:
+        tip = np.array([[0.0, 0.0], [22.0 * self._unit / view.scale, 0.0]])
+        ends = view.pixels(se2.transform(T_view_robot, tip))
+        if not (np.abs(ends) < 1e4).all():
+            return
+        draw.polyline(picture, ends, color, max(1, round(2 * self._unit)))
+        draw.dots(picture, ends[:1], [color], 4 * self._unit)
+
+
+def off_by(error: Float, covariance: Float) -> str:
+    """How far off, and how many of its own sigmas that is: ``1.7 cm off, 1.2 σ``.
+
+    error (2,) m and covariance (2, 2) m^2 in one frame.
+    """
+    a, b, c = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
+    determinant = a * c - b * b
+    word = f"{draw.measured(math.hypot(error[0], error[1]))} off"
+    if determinant <= 0.0:
+        return word
+    x, y = float(error[0]), float(error[1])
+    squared = (c * x * x - 2.0 * b * x * y + a * y * y) / determinant
+    return f"{word}, {math.sqrt(max(squared, 0.0)):.1f} σ"
+
+
+def _grown(radius: float, reach: float) -> float:
+    """The radius of sight for ``reach``: at once greater, smaller only by two steps or more."""
+    wanted = next((r for r in _RADII_M if r >= reach), _RADII_M[-1])
+    now = _RADII_M.index(radius)
+    then = _RADII_M.index(wanted)
+    return wanted if then > now or then < now - 1 else radius
+
+
+class RobotScan:
+    """Paints scans, or the features of a log that has these; what is shown grows with them."""
+
+    def __init__(self, size: tuple[int, int], unit: float) -> None:
+        self._size, self._unit = size, unit
+        self._reach = 5.0
+
+    def __call__(self, frame: Frame) -> Picture:
+        """(height, width, 3) uint8 RGB."""
+        width, height = self._size
+        T_robot_laser, ends, colors = beams(frame)
+        points = se2.transform(T_robot_laser, ends)
+        if len(ends):
+            far = 1.15 * float(np.percentile(np.hypot(ends[:, 0], ends[:, 1]), 90))
+            self._reach = max(self._reach, min(far, MOST_M))
+        spec = None if frame.scan is None else frame.scan.spec
+        wide = spec is not None and spec.n_beams * spec.angle_increment > 1.2 * math.pi
+        behind = 1.0 if wide else 0.12  # of that: so far down from the robot the pane reaches
+        bounds = (-self._reach, -behind * self._reach, self._reach, self._reach)
+        view = View.fitting(bounds, width, height)
+        picture: Picture = np.full((height, width, 3), draw.PAPER, np.uint8)
+        pixels = view.pixels(se2.transform(_FRONT_UP, points))
+        if spec is not None and len(points):
+            origin = view.pixels(se2.transform(_FRONT_UP, T_robot_laser[None, :2]))
+            draw.polygon(picture, np.vstack([origin, pixels]), draw.paler(FAN, 0.7))
+        draw.dots(picture, pixels, colors, 2.0 * self._unit)
+        draw.robot(picture, view, _FRONT_UP, draw.INK)
+        draw.scale_bar(picture, view, self._unit)
+        return picture

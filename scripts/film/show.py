@@ -16,10 +16,9 @@ import numpy as np
 
 from scripts.film import panes
 from scripts.film.chart import UNSURE, ErrorChart, Series
-from scripts.film.close_up import CloseUp, off_by
 from scripts.film.encode import SIZE, Pace, Size
-from scripts.film.layout import Box, Layout
-from scripts.film.map_pane import MapPane
+from scripts.film.map_pane import CloseUp, MapPane, off_by
+from scripts.film.panes import Box, Layout
 from scripts.film.stage import Stage
 from sim.events import Event
 from sim.view import draw

@@ -5,8 +5,8 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 
-from scripts.film.layout import Layout
-from scripts.film.scan_pane import RobotScan
+from scripts.film.map_pane import RobotScan
+from scripts.film.panes import Layout
 from sim.events import Event, EventWatch
 from sim.moments import Moment
 from sim.simulation import Simulation

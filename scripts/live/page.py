@@ -17,12 +17,13 @@ from typing import Any
 
 import numpy as np
 
-from scripts.live.playback import KEPT_S, Playback
-from scripts.live.requests import (
+from scripts.live.playback import (
+    KEPT_S,
     Anew,
     Click,
     Drive,
     Inbox,
+    Playback,
     Request,
     Run,
     Seek,

@@ -5,18 +5,247 @@ from __future__ import annotations
 
 import asyncio
 import contextlib
+import hmac
 import importlib
 import io
+import ipaddress
+import logging
 import secrets
+import sys
+import threading
 from collections.abc import Sequence
+from contextlib import suppress
+from dataclasses import dataclass
+from http import HTTPStatus
 from pathlib import Path
 from typing import Any
+from urllib.parse import urlsplit
 
 import numpy as np
 
 from scripts.live.drawn import LOG_BOUNDS, look_at
-from scripts.live.gate import SECRET, Gate, hidden_host, new_token
+from sim.core.checks import MOST_LETTERS
 from slam.errors import InvalidValueError, MissingDependencyError
+
+log = logging.getLogger(__name__)
+
+MOST_CLIENTS = 8  # at once
+MOST_BYTES = 4096  # of a message of a page; where its camera is takes 300
+MOST_RATE = 120.0  # messages a second of one page; more of them wait
+HEAD_S = 5.0  # s until a handshake is there
+CARRIED = 1 << 16  # bytes that wait in the gate for a client that is slow, and a message more
+KINDS = (
+    "ViewerCameraMessage", "GuiUpdateMessage", "GuiButtonHoldMessage", "ScenePointerMessage",
+    "CommandTriggerMessage",
+)  # fmt: skip
+SECRET = "X-Mobilia-Gate"  # header of a handshake that went through the gate
+
+
+class Refused(Exception):
+    """A handshake that is not let through: status and reason."""
+
+    def __init__(self, status: HTTPStatus, why: str) -> None:
+        super().__init__(why)
+        self.status = status
+
+
+@dataclass(frozen=True, kw_only=True)
+class Rules:
+    """Who is let in.
+
+    host     that the gate listens at, ``port`` too
+    origins  of pages beside those that the gate's own address serves
+    token    that the address must hold; empty: none
+    """
+
+    host: str
+    port: int
+    origins: tuple[str, ...] = ()
+    token: str = ""
+
+    def names(self) -> frozenset[str]:
+        """Hosts that a client may have asked for: a name that leads here by force is none."""
+        own = f"[{self.host}]" if ":" in self.host else self.host
+        return frozenset(f"{name}:{self.port}" for name in ("localhost", "127.0.0.1", "[::1]", own))
+
+    def check(self, path: str, headers: Any) -> bool:
+        """Whether a request, ``headers`` of ``websockets``, wants the page; False: its WebSocket.
+
+        Raises ``Refused``.
+        """
+        hosts, origins = headers.get_all("Host"), headers.get_all("Origin")
+        given = path.partition("?")[0].strip("/")
+        if len(hosts) != 1 or (not self.token and hosts[0].lower() not in self.names()):
+            raise Refused(HTTPStatus.FORBIDDEN, f"the address is not {self.host}:{self.port}")
+        if self.token and not hmac.compare_digest(given.encode(), self.token.encode()):
+            raise Refused(HTTPStatus.FORBIDDEN, "the token in the address is missing or wrong")
+        if origins and (len(origins) > 1 or not self._knows(origins[0], hosts[0])):
+            why = f"a page of {origins[0]!r:.80} wants in; --allow-origin lets it"
+            raise Refused(HTTPStatus.FORBIDDEN, why)
+        if headers.get_all("Upgrade"):
+            return False
+        if given != self.token:
+            raise Refused(HTTPStatus.NOT_FOUND, "there is one page only")
+        return True
+
+    def _knows(self, origin: str, host: str) -> bool:
+        return origin in (*self.origins, f"http://{host.lower()}", f"https://{host.lower()}")
+
+
+def origin_of(text: str) -> str:
+    """``--allow-origin``, checked: scheme://host[:port], or what pages and apps on disk send."""
+    parts = urlsplit(text)
+    whole = f"{parts.scheme}://{parts.netloc}"
+    if text in ("null", "file://") or (parts.scheme and parts.netloc and text == whole):
+        return text
+    raise InvalidValueError(
+        f"--allow-origin must be like https://example.org:8080, got {text!r:.80}"
+    )
+
+
+def is_loopback(host: str) -> bool:
+    """Whether only this machine can reach it."""
+    try:
+        return host == "localhost" or ipaddress.ip_address(host).is_loopback
+    except ValueError:
+        return False
+
+
+def new_token(host: str) -> str:
+    """What the address must hold where others can reach it, else nothing."""
+    return "" if is_loopback(host) else secrets.token_urlsafe(16)
+
+
+def hidden_host() -> str:
+    """A loopback address that no page can guess, where the system has more than one."""
+    if not sys.platform.startswith("linux"):
+        return "127.0.0.1"
+    return f"127.{1 + secrets.randbelow(254)}.{secrets.randbelow(256)}.{1 + secrets.randbelow(254)}"
+
+
+class Gate:
+    """Listens at an address in a thread of its own, before a server at ``behind``.
+
+    page    what is given to a browser;   secret  by which the server behind knows the gate
+    port    where it listens, also where 0 was asked for
+    """
+
+    def __init__(
+        self, address: tuple[str, int], behind: tuple[str, int], page: bytes, *,
+        origins: Sequence[str] = (), token: str = "", secret: str = "",
+    ) -> None:  # fmt: skip
+        self._behind, self._page, self._secret = behind, page, secret
+        self._loop = asyncio.new_event_loop()
+        host, port = address
+        try:
+            self._server: Any = self._loop.run_until_complete(self._listen(host, port))
+        except (OSError, OverflowError, UnicodeError) as error:
+            self._loop.close()
+            raise InvalidValueError(f"cannot listen at {host}:{port}: {error}") from error
+        self.port = int(self._server.sockets[0].getsockname()[1])
+        self.rules = Rules(host=host, port=self.port, origins=tuple(origins), token=token)
+        self._thread = threading.Thread(target=self._run, name="gate", daemon=True)
+        self._thread.start()
+
+    async def _listen(self, host: str, port: int) -> Any:
+        quiet = log.getChild("websockets")
+        quiet.setLevel(logging.CRITICAL)  # whoever speaks no HTTP is not worth a traceback
+        return await importlib.import_module("websockets.asyncio.server").serve(
+            self._carry, host, port, process_request=self._let_in, compression=None,
+            select_subprotocol=lambda _, offered: next(iter(offered), None), server_header=None,
+            open_timeout=HEAD_S, close_timeout=HEAD_S, max_size=MOST_BYTES, max_queue=2,
+            write_limit=CARRIED, logger=quiet,
+        )  # fmt: skip
+
+    def _run(self) -> None:
+        self._loop.run_forever()
+        self._server.close()
+        self._loop.run_until_complete(self._server.wait_closed())
+        self._loop.close()
+
+    def close(self) -> None:
+        """Stop listening, and let go of all clients."""
+        if not self._loop.is_closed():
+            self._loop.call_soon_threadsafe(self._loop.stop)
+        self._thread.join(HEAD_S)
+
+    def _let_in(self, connection: Any, request: Any) -> Any:
+        """The answer to a request; None lets a WebSocket in."""
+        try:
+            if len(self._server.handlers) > MOST_CLIENTS:
+                why = f"{MOST_CLIENTS} clients are here already"
+                raise Refused(HTTPStatus.SERVICE_UNAVAILABLE, why)
+            if not self.rules.check(request.path, request.headers):
+                return None
+        except Refused as error:
+            log.warning("live view: refused: %s", error)
+            return connection.respond(error.status, "")
+        answer = connection.respond(HTTPStatus.OK, "")
+        del answer.headers["Content-Length"], answer.headers["Content-Type"]
+        answer.headers["Content-Length"] = str(len(self._page))
+        answer.headers["Content-Type"] = "text/html; charset=utf-8"
+        answer.body = self._page
+        return answer
+
+    async def _carry(self, outer: Any) -> None:
+        """Messages in and out until one side ends; a slow side stops the other only."""
+        websockets = importlib.import_module("websockets.asyncio.client")
+        closed = importlib.import_module("websockets.exceptions").WebSocketException
+        spoken = [outer.subprotocol] if outer.subprotocol else None
+        with suppress(OSError, closed):
+            async with websockets.connect(
+                f"ws://{self._behind[0]}:{self._behind[1]}", subprotocols=spoken, compression=None,
+                additional_headers={SECRET: self._secret}, max_size=None, max_queue=1,
+                ping_interval=None, proxy=None,
+            ) as inner:  # fmt: skip
+                ways = [
+                    asyncio.ensure_future(way)
+                    for way in (_pass_on(outer, inner), _pour(inner, outer))
+                ]
+                try:
+                    await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
+                finally:
+                    for way in ways:
+                        way.cancel()
+                    await asyncio.gather(*ways, return_exceptions=True)
+
+
+async def _pass_on(outer: Any, inner: Any) -> None:
+    """Messages of a page; ends at one that no page sends."""
+    async for message in outer:
+        if not isinstance(message, bytes):
+            log.warning("live view: a page sent what is no message of it, and is let go")
+            return
+        if may_pass(message):
+            await inner.send(message)
+        await asyncio.sleep(1.0 / MOST_RATE)
+
+
+async def _pour(inner: Any, outer: Any) -> None:
+    async for message in inner:
+        await outer.send(message)
+
+
+def may_pass(message: bytes) -> bool:
+    """Whether a page's message is of a kind that a view needs; others are dropped."""
+    msgpack = importlib.import_module("msgspec.msgpack")
+    try:
+        words = msgpack.decode(message)
+    except (ValueError, RecursionError):  # msgspec's own errors are ValueErrors
+        return False
+    if not isinstance(words, dict) or words.get("type") not in KINDS:
+        return False
+    if words["type"] != "GuiUpdateMessage":
+        return True
+    updates = words.get("updates")
+    return isinstance(updates, dict) and all(
+        key == "value" and (isinstance(value, bool | float | int) or _is_word(value))
+        for key, value in updates.items()
+    )
+
+
+def _is_word(value: object) -> bool:
+    return isinstance(value, str) and len(value) <= MOST_LETTERS and value.isprintable()
 
 
 def require() -> Any:

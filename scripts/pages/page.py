@@ -105,7 +105,11 @@ class Page:
 def write(folder: Path, page: Page) -> Path:
     """``index.html`` among the files of ``folder``, which are listed; its path."""
     path = folder / INDEX
-    parts = [one for one in page.parts if _there(folder, one.picture)]
+    parts = [
+        one
+        for one in page.parts
+        if one.picture.startswith(INLINE) or (folder / one.picture).exists()  # "": the folder
+    ]
     text = template("folder.html").render(
         page=page, marks={}, files=_files(folder),
         parts=[(one, None if one.table is None else of_printed(one.table)) for one in parts],
@@ -157,10 +161,6 @@ def inline(picture: NDArray[np.uint8]) -> str:
     """An RGB picture (height, width, 3) that lies in the page itself, as PNG."""
     _, png = cv2.imencode(".png", cv2.cvtColor(picture, cv2.COLOR_RGB2BGR))
     return INLINE + base64.b64encode(png.tobytes()).decode()
-
-
-def _there(folder: Path, picture: str) -> bool:
-    return not picture or picture.startswith(INLINE) or (folder / picture).exists()
 
 
 def _names(folder: Path, pattern: str = "*") -> list[str]:

@@ -6,18 +6,7 @@ from __future__ import annotations
 from typing import Any
 
 from scripts.figures import styled
-from scripts.paper.comparison import TABLE_3, below_printed, paper_table
-from scripts.paper.report import (
-    COLORS,
-    Report,
-    active,
-    draw_activities,
-    draw_ellipses,
-    error_axes,
-    legend_below,
-    map_panels,
-    window_over,
-)
+from scripts.paper import report as pages
 from scripts.paper.room_pages import RULE, fig_rmse, run_all, score_table, seconds_of, verdict
 from scripts.paper.runs import Plan, Run
 
@@ -30,7 +19,7 @@ LIMITS = {"x": (0.05, 0.01), "y": (0.05, 0.01), "θ": (0.03, 0.01)}
 @styled()
 def reproduce(plan: Plan) -> None:
     """With walls and without, every SLAM, every seed."""
-    report = Report("chairs", plan)
+    report = pages.Report("chairs", plan)
     by_variant = run_all(report, plan, "arena", DYNAMISM, VARIANTS)
     report.say(
         f"16 chairs in 10 x 8 m, each shoved every 7 s on average (0.25 to 1.5 m/s), "
@@ -44,8 +33,8 @@ def reproduce(plan: Plan) -> None:
         report.heading(f"Table 3, {TITLES[variant]}")
         numbers = [run.numbers for run in runs]
         names = ("EKF", "shunting", "shunting, paper preset")
-        paper_table(report, f"Table 3, {TITLES[variant]}", TABLE_3, numbers, names)
-        told = "; ".join(below_printed(TABLE_3, numbers, "shunting", limits=LIMITS))
+        pages.paper_table(report, f"Table 3, {TITLES[variant]}", pages.TABLE_3, numbers, names)
+        told = "; ".join(pages.below_printed(pages.TABLE_3, numbers, "shunting", limits=LIMITS))
         report.say(
             f"Table 3, {TITLES[variant]}: shunting on beams, medians, against the project's "
             f"targets: {told}."
@@ -61,7 +50,7 @@ def reproduce(plan: Plan) -> None:
         }
         title = f"Chairs, {TITLES[variant]}, single run"
         report.figure(f"fig11-{variant}", fig11(single, title), f"Fig. 11: maps, {TITLES[variant]}")
-        figure = error_axes(single.arrays["seconds"], errors, title)
+        figure = pages.error_axes(single.arrays["seconds"], errors, title)
         report.figure(f"fig12-{variant}", figure, f"Fig. 12: errors, {TITLES[variant]}")
     figure = fig_rmse({TITLES[v]: runs for v, runs in by_variant.items()})
     report.figure("rmse", figure, "RMSE of every seed; bars are medians")
@@ -78,18 +67,18 @@ def fig11(run: Run, title: str) -> Any:
         if f"activities {name}" in a
     }
     things = [a["truth"], a["ellipses EKF"], *(a[f"poses {name}"] for name in names)]
-    whole = window_over([*things, *(active(*drawn) for drawn in maps.values())])
-    figure, axes = map_panels([whole], columns=3, width=14.0)
+    whole = pages.window_over([*things, *(pages.active(*drawn) for drawn in maps.values())])
+    figure, axes = pages.map_panels([whole], columns=3, width=14.0)
     for ax, letter, name in zip(axes, "abc", names, strict=True):
         if name == "EKF":
-            draw_ellipses(ax, a["ellipses EKF"], label="landmark, 3 σ", dot=1.0)
+            pages.draw_ellipses(ax, a["ellipses EKF"], label="landmark, 3 σ", dot=1.0)
         elif name in maps:
-            image = draw_activities(ax, *maps[name], "Greys")
+            image = pages.draw_activities(ax, *maps[name], "Greys")
             figure.colorbar(image, ax=ax, label="activity", shrink=0.8)
-        ax.plot(*a["truth"].T[:2], "-", color=COLORS["truth"], lw=1.0, label="true path")
+        ax.plot(*a["truth"].T[:2], "-", color=pages.COLORS["truth"], lw=1.0, label="true path")
         ax.plot(*a[f"poses {name}"].T[:2], "--", color="#1f61be", lw=1.0, label="estimated path")
         whole.show(ax)
         ax.set(title=f"({letter}) {name}")
-    legend_below(figure, axes)
+    pages.legend_below(figure, axes)
     figure.suptitle(title)
     return figure

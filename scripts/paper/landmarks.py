@@ -14,22 +14,9 @@ from typing import Any
 import numpy as np
 
 from scripts.figures import styled
+from scripts.paper import report as pages
 from scripts.paper.census import GATE_M, PEAK
-from scripts.paper.comparison import TABLE_2, below_printed, paper_table
 from scripts.paper.point_runs import SHUNTING, run_one
-from scripts.paper.report import (
-    COLORS,
-    Report,
-    active,
-    draw_activities,
-    draw_ellipses,
-    error_axes,
-    legend_below,
-    map_panels,
-    new_figure,
-    window_about,
-    window_over,
-)  # fmt: skip
 from scripts.paper.runs import Plan, Run, job, sign_test, spread
 from slam.frames import Float
 
@@ -42,7 +29,7 @@ NAMES = ("odometry", "EKF", "shunting", "known associations")
 @styled()
 def reproduce(plan: Plan) -> None:
     """The sweep, the two figures, the table."""
-    report = Report("landmarks", plan)
+    report = pages.Report("landmarks", plan)
     steps = 60 if plan.quick else 220
     shares = (0.0, PAPER_SHARE, 0.75) if plan.quick else SHARES
     seeds = plan.seed_list()
@@ -69,7 +56,7 @@ def reproduce(plan: Plan) -> None:
     errors = {n: single[f"errors {n}"] for n in ("EKF", "shunting", "known associations")}
     report.figure(
         "fig9",
-        error_axes(single["seconds"], errors, "Simulated landmarks, 25 % moving, single run"),
+        pages.error_axes(single["seconds"], errors, "Simulated landmarks, 25 % moving, single run"),
         "Fig. 9: errors over time",
     )
     report.figure("sweep", fig_sweep(by_share), "RMSE against the share of points that move")
@@ -79,7 +66,7 @@ def reproduce(plan: Plan) -> None:
     report.finish("Simulated landmarks (paper: section 4.2, Figs. 8 and 9, Table 2)")
 
 
-def _table_2(report: Report, runs: Sequence[Run]) -> None:
+def _table_2(report: pages.Report, runs: Sequence[Run]) -> None:
     report.heading("Table 2, at 25 % moving")
     report.say(
         "Eq. (14)'s 0.1, 0.03 and 0.001 are taken as standard deviations (m, rad per 0.5 m step; "
@@ -87,12 +74,12 @@ def _table_2(report: Report, runs: Sequence[Run]) -> None:
     )
     numbers = [run.numbers for run in runs]
     names = ("EKF", "shunting", "known associations")
-    paper_table(report, "Table 2, 25 % moving", TABLE_2, numbers, names)
-    told = "; ".join(below_printed(TABLE_2, numbers, "shunting"))
+    pages.paper_table(report, "Table 2, 25 % moving", pages.TABLE_2, numbers, names)
+    told = "; ".join(pages.below_printed(pages.TABLE_2, numbers, "shunting"))
     report.say(f"Table 2, shunting, median, against the paper's “Our”: {told}.")
 
 
-def _sweep(report: Report, by_share: dict[float, list[Run]]) -> None:
+def _sweep(report: pages.Report, by_share: dict[float, list[Run]]) -> None:
     report.heading("How many may move")
     rows = []
     for share, runs in by_share.items():
@@ -147,13 +134,13 @@ def _verdict(by_share: dict[float, list[Run]]) -> str:
 
 def fig_sweep(by_share: dict[float, list[Run]]) -> Any:
     """Median and quartiles of the RMSE over the moving share."""
-    figure, axes = new_figure(7.5, 4.5)
+    figure, axes = pages.new_figure(7.5, 4.5)
     x = [100.0 * share for share in by_share]
     for name in NAMES:
         s = [spread(run.numbers[name]["rmse_m"] for run in runs) for runs in by_share.values()]
-        axes[0].plot(x, [v.median for v in s], "o-", color=COLORS[name], ms=4, label=name)
+        axes[0].plot(x, [v.median for v in s], "o-", color=pages.COLORS[name], ms=4, label=name)
         axes[0].fill_between(
-            x, [v.low for v in s], [v.high for v in s], color=COLORS[name], alpha=0.15, lw=0.0
+            x, [v.low for v in s], [v.high for v in s], color=pages.COLORS[name], alpha=0.15, lw=0.0
         )
     axes[0].set(yscale="log", xlabel="moving points in %", ylabel="RMSE of the position in m",
                 title="Median and quartiles over the seeds")  # fmt: skip
@@ -166,17 +153,18 @@ def fig8(run: Run) -> Any:
     them: whole maps show ellipses of centimetres as dots."""
     a = run.arrays
     drawn = (a["activities"], a["origin"], float(a["cell"]))
-    whole = window_over([a["true"], a["truth"], a["ellipses"], active(*drawn)])
-    part = window_about(_typical(a), 0.15)
-    figure, axes = map_panels([whole, part], columns=2, width=11.0)
+    whole = pages.window_over([a["true"], a["truth"], a["ellipses"], pages.active(*drawn)])
+    part = pages.window_about(_typical(a), 0.15)
+    figure, axes = pages.map_panels([whole, part], columns=2, width=11.0)
     for k, ax in enumerate(axes):
         name = ("EKF", "shunting")[k % 2]
         if name == "EKF":
-            draw_ellipses(ax, a["ellipses"], label="landmark, 3 σ")
+            pages.draw_ellipses(ax, a["ellipses"], label="landmark, 3 σ")
         else:
-            image = draw_activities(ax, *drawn, "Greys", swell=k < 2)
-        ax.plot(*a["true"].T, "+", color=COLORS["truth"], ms=7, mew=1.0, label="true static point")
-        ax.plot(*a["truth"].T[:2], "-", color=COLORS["truth"], lw=0.9, label="true path")
+            image = pages.draw_activities(ax, *drawn, "Greys", swell=k < 2)
+        green = pages.COLORS["truth"]
+        ax.plot(*a["true"].T, "+", color=green, ms=7, mew=1.0, label="true static point")
+        ax.plot(*a["truth"].T[:2], "-", color=green, lw=0.9, label="true path")
         ax.plot(*a[f"poses {name}"].T[:2], "--", color="#1f61be", lw=1.0, label="estimated path")
         (part if k >= 2 else whole).show(ax)
         titles = ("EKF, IPJC and lifecycle", "shunting on features", "EKF", "shunting")
@@ -184,7 +172,7 @@ def fig8(run: Run) -> Any:
     for ax in axes[:2]:
         ax.plot(*_typical(a), "o", ms=14, mfc="none", mec="#ce2c3c", label="shown in (c), (d)")
     figure.colorbar(image, ax=list(axes), shrink=0.5, aspect=40, label="activity")
-    legend_below(figure, axes)
+    pages.legend_below(figure, axes)
     return figure
 
 

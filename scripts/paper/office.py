@@ -8,16 +8,8 @@ from typing import Any
 import numpy as np
 
 from scripts.figures import styled
+from scripts.paper import room_pages
 from scripts.paper.report import Report, draw_activities, new_figure
-from scripts.paper.room_pages import (
-    RULE,
-    fig_rmse,
-    path_length,
-    run_all,
-    score_table,
-    seconds_of,
-    verdict,
-)
 from scripts.paper.runs import Plan, Run
 
 DYNAMISM = 0.5
@@ -27,19 +19,21 @@ DYNAMISM = 0.5
 def reproduce(plan: Plan) -> None:
     """The office, every SLAM, every seed; the paper gives a picture and no numbers."""
     report = Report("office", plan)
-    runs = run_all(report, plan, "office", DYNAMISM, {"office": {}})["office"]
-    driven = path_length(runs[0].arrays["truth"])
+    runs = room_pages.run_all(report, plan, "office", DYNAMISM, {"office": {}})["office"]
+    driven = room_pages.path_length(runs[0].arrays["truth"])
     report.say(
         f"20 x 12 m: 24 chairs, 6 people, doors and bins, each with a mobility of its own, "
-        f"{seconds_of(runs[0]):.0f} s ({driven:.0f} m in the single run) with the LMS-221 at "
-        "7.5 Hz with all its effects. The paper shows a map and no numbers."
+        f"{room_pages.seconds_of(runs[0]):.0f} s ({driven:.0f} m in the single run) with the "
+        "LMS-221 at 7.5 Hz with all its effects. The paper shows a map and no numbers."
     )
-    report.say(RULE)
-    score_table(report, runs)
-    report.say(verdict(runs), quote=True)
+    report.say(room_pages.RULE)
+    room_pages.score_table(report, runs)
+    report.say(room_pages.verdict(runs), quote=True)
     for name, file in (("shunting", "fig13"), ("shunting, paper preset", "fig13-paper")):
         report.figure(file, fig13(runs[0], name), f"Fig. 13: office, {name}, single run")
-    report.figure("rmse", fig_rmse({"office": runs}), "RMSE of every seed; bars are medians")
+    report.figure(
+        "rmse", room_pages.fig_rmse({"office": runs}), "RMSE of every seed; bars are medians"
+    )
     report.finish("Office (paper: section 4.3, Fig. 13)")
 
 

@@ -9,7 +9,7 @@ from typing import Any
 import numpy as np
 
 from scripts.figures import styled
-from scripts.paper.comparison import TABLE_1, paper_table
+from scripts.paper import report as pages
 from scripts.paper.park_runs import SYSTEMS, read, run_graph, run_one
 from scripts.paper.park_scores import (
     FASTEST,
@@ -23,18 +23,6 @@ from scripts.paper.park_scores import (
     headings_off,
     landmark_numbers,
     pose_numbers,
-)
-from scripts.paper.report import (
-    COLORS,
-    Report,
-    active,
-    draw_activities,
-    draw_ellipses,
-    error_axes,
-    legend_below,
-    map_panels,
-    window_about,
-    window_over,
 )
 from scripts.paper.runs import Plan, Run, job
 from slam import se2
@@ -58,7 +46,7 @@ def reproduce(plan: Plan) -> None:
     """All SLAMs, the graph, the figures and the table."""
     if plan.data is None:
         raise InvalidValueError(WHERE)
-    report = Report("victoria-park", plan)
+    report = pages.Report("victoria-park", plan)
     scans = 900 if plan.quick else 0
     data = str(plan.data)
     _, gps = read(data, scans)
@@ -91,7 +79,7 @@ def _track(run: Run, key: str = "poses") -> Trajectory:
     return Trajectory(stamps_ns=run.arrays["stamps"], poses=run.arrays[key])
 
 
-def _positions(report: Report, numbers: Numbers, gps: GpsTrack) -> None:
+def _positions(report: pages.Report, numbers: Numbers, gps: GpsTrack) -> None:
     good = good_fixes(gps)
     report.heading("Positions against GPS")
     report.say(
@@ -124,7 +112,7 @@ def _positions(report: Report, numbers: Numbers, gps: GpsTrack) -> None:
     )
 
 
-def _table_1(report: Report, numbers: Numbers) -> None:
+def _table_1(report: pages.Report, numbers: Numbers) -> None:
     report.heading("Table 1")
     report.say(
         "x and y against GPS (east, north), heading and landmarks against the graph, all after "
@@ -132,10 +120,10 @@ def _table_1(report: Report, numbers: Numbers) -> None:
         "see below. The paper does not say what its truth was."
     )
     names = [name for name in numbers if name not in ("odometry", "graph")]
-    paper_table(report, "Table 1", TABLE_1, [numbers], [*names, "graph"])
+    pages.paper_table(report, "Table 1", pages.TABLE_1, [numbers], [*names, "graph"])
 
 
-def _landmarks(report: Report, numbers: Numbers) -> None:
+def _landmarks(report: pages.Report, numbers: Numbers) -> None:
     report.heading("Landmarks")
     rows = []
     for name, n in numbers.items():
@@ -163,25 +151,27 @@ def fig6(by_name: dict[str, Run], tracks: dict[str, Trajectory], gps: GpsTrack) 
         a, T_map_gps = by_name[name].arrays, se2.inverse(first_fit(tracks[name], gps))
         fixes[name] = se2.transform(T_map_gps, gps.points[good_fixes(gps)])
         things += [fixes[name], tracks[name].poses]
-        things.append(a["ellipses"] if "ellipses" in a else active(*_drawn(a)))
+        things.append(a["ellipses"] if "ellipses" in a else pages.active(*_drawn(a)))
     middle = np.median(tracks["EKF"].poses[:, :2], axis=0)
-    whole, part = window_over(things), window_about(middle, 20.0)
-    figure, axes = map_panels([whole, part], columns=2, width=11.5)
+    whole, part = pages.window_over(things), pages.window_about(middle, 20.0)
+    figure, axes = pages.map_panels([whole, part], columns=2, width=11.5)
     for k, ax in enumerate(axes):
         name = ("EKF", "shunting")[k % 2]
         a = by_name[name].arrays
         if "ellipses" in a:
-            draw_ellipses(ax, a["ellipses"], label="landmark, 3 σ", dot=0.5 if k >= 2 else 2.5)
+            pages.draw_ellipses(
+                ax, a["ellipses"], label="landmark, 3 σ", dot=0.5 if k >= 2 else 2.5
+            )
         else:
-            image = draw_activities(ax, *_drawn(a), "Greys", swell=k < 2)
-        ax.plot(*fixes[name].T, ".", color=COLORS["GPS"], ms=2.0, label="GPS")
+            image = pages.draw_activities(ax, *_drawn(a), "Greys", swell=k < 2)
+        ax.plot(*fixes[name].T, ".", color=pages.COLORS["GPS"], ms=2.0, label="GPS")
         ax.plot(*tracks[name].poses.T[:2], "-", color="#1f61be", lw=0.9, label="path")
         (part if k >= 2 else whole).show(ax)
         ax.set(title=f"({'abcd'[k]}) {name}, {'framed part' if k >= 2 else 'whole'}")
     for ax in axes[:2]:
         part.mark(ax)
     figure.colorbar(image, ax=list(axes), shrink=0.5, aspect=40, label="activity")
-    legend_below(figure, axes)
+    pages.legend_below(figure, axes)
     return figure
 
 
@@ -198,7 +188,7 @@ def broken(seconds: Float, errors: Float) -> tuple[Float, Float]:
     )
 
 
-def _fig7(report: Report, tracks: dict[str, Trajectory], gps: GpsTrack) -> None:
+def _fig7(report: pages.Report, tracks: dict[str, Trajectory], gps: GpsTrack) -> None:
     """x and y over GPS, heading against the graph, at the good fixes."""
     good = good_fixes(gps)
     seconds = (gps.stamps_ns[good] - gps.stamps_ns[0]) * 1e-9
@@ -211,6 +201,8 @@ def _fig7(report: Report, tracks: dict[str, Trajectory], gps: GpsTrack) -> None:
         times, errors[name] = broken(seconds, np.column_stack([e, turned])[good])
     report.figure(
         "fig7",
-        error_axes(times, errors, "Victoria Park: x, y against GPS, heading against the graph"),
+        pages.error_axes(
+            times, errors, "Victoria Park: x, y against GPS, heading against the graph"
+        ),
         f"Fig. 7: errors over time; nothing is drawn where GPS was silent for {GAP_S:g} s",
     )

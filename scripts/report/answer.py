@@ -17,7 +17,6 @@ from scripts.comparison.schema import FAILED
 from scripts.comparison.tables import by_seed, number
 from scripts.options import PEOPLE
 from scripts.report.study import LEAST_RUNS, verdict
-from scripts.report.words import listed
 from slam.evaluation.statistics import paired, share_interval
 from slam.variants import ORACLE, oracle_of
 
@@ -48,6 +47,11 @@ class Lost:
     def __str__(self) -> str:
         interval = percent(self.lost, self.runs)
         return f"{self.lost} of {self.runs} runs" + (f", {interval}" if interval else "")
+
+
+def listed(words: Sequence[str]) -> str:
+    """a, b and c."""
+    return words[0] if len(words) == 1 else ", ".join(words[:-1]) + " and " + words[-1]
 
 
 def percent(hits: int, runs: int) -> str:
@@ -105,10 +109,6 @@ def _each(counts: Sequence[Lost]) -> str:
     return f"0 of {least.runs} runs at each level" + (f", {interval}" if interval else "")
 
 
-def _worst(counts: Sequence[Lost]) -> Lost:
-    return max(counts, key=lambda one: one.lost / max(one.runs, 1))
-
-
 def standing(
     rows: Sequence[Row], subject: str, scene: str, axis: str = "dynamism", runs_a_seed: int = 1
 ) -> Standing:
@@ -128,7 +128,7 @@ def standing(
                 subject=_lost(here, subject),
                 odometry=_lost(here, odometry) if odometry else None,
                 against=against(here, subject, odometry) if odometry else 0,
-                farther=_farther(here, subject, odometry) if odometry else 0,
+                farther=sum(a > b for a, b in _errors(here, subject, odometry)) if odometry else 0,
                 oracle=_lost(here, oracle) if oracle else None,
             )
         )
@@ -158,10 +158,6 @@ def against(rows: Sequence[Row], a: str, b: str) -> int:
         return 0
     of_a, of_b = zip(*both, strict=True)
     return verdict(paired(of_a, of_b, less_is_better=True), less_is_better=True)
-
-
-def _farther(rows: Sequence[Row], a: str, b: str) -> int:
-    return sum(of_a > of_b for of_a, of_b in _errors(rows, a, b))
 
 
 def _errors(rows: Sequence[Row], a: str, b: str) -> list[tuple[float, float]]:
@@ -308,7 +304,9 @@ def controls(of: Standing) -> list[str]:
     elif not any(one.lost for one in best):
         said.append(f"The oracle is never lost ({_each(best)}), so the room is fair.")
     else:
-        said.append(f"The oracle is lost in up to {_worst(best)}.")
+        said.append(
+            f"The oracle is lost in up to {max(best, key=lambda one: one.lost / max(one.runs, 1))}."
+        )
     return said
 
 

@@ -9,12 +9,12 @@ from collections.abc import Iterable, Mapping, Sequence
 from pathlib import Path
 from typing import Any
 
-from scripts.closed_loop.folder import Driven
+from scripts.closed_loop.tables import Driven
 from scripts.comparison.plan import Run
 from scripts.comparison.schema import LATER, settings
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
 from scripts.pages.page import Cell, Table, template
-from scripts.report import answer, curves, pictures, score_tables, style, tables, words
+from scripts.report import answer, curves, pictures, score_tables, tables
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
 from slam.files import write_text
@@ -37,17 +37,19 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
     scenes = [_scene(study, scene) for scene in study.scenes]  # first: these read the runs
     return template("page.html", Path(__file__).parent).render(
         study=study,
-        marks={slam: (style.glyph(slam, slams), style.color(slam, slams)) for slam in slams},
+        marks={slam: (curves.glyph(slam, slams), curves.color(slam, slams)) for slam in slams},
         drives=[(drive, curves.of_drive(drive, slams), tables.of_drive(drive)) for drive in drives],
         settings=study.compared.settings,
         answers=answers(study),
         controls=_controls(study),
         failures=answer.failed(study.compared.runs, study.axis),
-        summary=_summary(study),
+        growth=[]
+        if len(study.levels) == 1
+        else [(scene, tables.growth(study, scene)) for scene in study.scenes],
+        least=LEAST_RUNS,
         curves=_curves(study),
         differences=_differences(study),
         outcomes=tables.of_outcomes(study),
-        messages=tables.messages(study),
         honesty=_levels(study, of_section("honesty")),
         costs=tables.costs(study, of_section("costs")),
         maps=_levels(study, of_section("maps")),
@@ -89,18 +91,6 @@ def blame_command(study: Study, row: dict[str, Any], folder: str = "FOLDER") -> 
 
 def _there(study: Study, keys: Iterable[str]) -> list[str]:
     return [key for key in keys if study.has(key)]
-
-
-def _summary(study: Study) -> dict[str, Any]:
-    return {
-        "scenes": [
-            (scene, words.leaders(study, scene), tables.growth(study, scene))
-            for scene in study.scenes
-        ],
-        "beaten": words.against_subject(study, -1),
-        "better": words.against_subject(study, 1),
-        "least": LEAST_RUNS,
-    }
 
 
 def _curves(study: Study) -> list[tuple[str, list[tuple[str, str]]]]:

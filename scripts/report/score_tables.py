@@ -14,7 +14,7 @@ from scripts.comparison.schema import ANEW
 from scripts.comparison.tables import grouped
 from scripts.console import plain_table
 from scripts.days.scores import SCORES, Row, Score, first_words, levels
-from scripts.metrics.row import digits
+from scripts.metrics.table import digits
 from scripts.report.answer import percent
 from scripts.report.study import LEAST_RUNS
 

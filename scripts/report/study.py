@@ -12,14 +12,13 @@ from pathlib import Path
 from typing import Any
 
 from scripts.comparison import tables
-from scripts.comparison.csv_files import Row
 from scripts.comparison.folder import Compared, read
 from scripts.comparison.run_file import RunFile
 from scripts.comparison.schema import LEVELS, PAIRED, RUNS
+from scripts.comparison.tables import Row
 from scripts.names import DATASET
 from scripts.output import RECIPE, read_recipe_words
 from slam.errors import InvalidValueError, LogFormatError, MissingPathError
-from slam.variants import ORACLE
 
 LEAST_RUNS = 6  # with fewer not even all wins are unlikely enough by chance (sign test, 5 %)
 WORST = 3  # runs of a scene that the page lists
@@ -70,11 +69,6 @@ class Study:
     def rivals(self) -> list[str]:
         """All others."""
         return [slam for slam in self.slams if slam != self.subject]
-
-    @property
-    def contestants(self) -> list[str]:
-        """All others but oracles, which are bounds: they are shown what nobody else is."""
-        return [slam for slam in self.rivals if not slam.startswith(ORACLE)]
 
     @property
     def few(self) -> bool:

@@ -4,16 +4,15 @@
 from __future__ import annotations
 
 import math
-import re
 from collections import Counter
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
+from functools import partial
+from typing import Any
 
-from scripts.closed_loop.folder import Driven
-from scripts.comparison.csv_files import Row
+from scripts.closed_loop.tables import Driven
 from scripts.comparison.schema import OUTCOMES
-from scripts.comparison.tables import by_seed, number
-from scripts.metrics.row import Metric, digits
-from scripts.metrics.table import METRICS
+from scripts.comparison.tables import Row, by_seed, number
+from scripts.metrics.table import METRICS, Metric, digits
 from scripts.pages.page import Cell, Table
 from scripts.report.answer import percent
 from scripts.report.curves import PRECISION, SUCCESS, few_goals
@@ -24,77 +23,70 @@ from slam.variants import ORACLE
 _MARKS = {1: "better", -1: "worse", 0: ""}
 
 
+def _label(of: str | float | Metric) -> str:
+    """What a row or a column is called."""
+    return of if isinstance(of, str) else of.heading if isinstance(of, Metric) else f"{of:g}"
+
+
+def _grid(
+    caption: str,
+    corner: str,
+    rows: Sequence[Any],
+    columns: Sequence[Any],
+    cell: Callable[[Any, Any], Cell],
+    slams: Sequence[str] = (),
+) -> Table:
+    """A row for each of ``rows``, a column for each of ``columns``."""
+    lines = [[Cell(text=_label(row)), *(cell(row, column) for column in columns)] for row in rows]
+    head = [corner, *map(_label, columns)]
+    return Table(caption=caption, head=head, rows=lines, slams=slams)
+
+
 def of_levels(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]:
     """Medians (shares) with their 95 % intervals of the measures that any SLAM has.
 
     A table for each measure: a row for each level, a column for each SLAM. One table for all with a
     single level (a row for each SLAM), and for the measures that one SLAM alone has.
     """
-    having = {metric: _having(study, scene, metric) for metric in metrics}
+    having = {
+        metric: [
+            slam for slam in study.slams
+            if any(study.level(scene, level, slam, metric.key) for level in study.levels)
+        ]
+        for metric in metrics
+    }  # fmt: skip
     having = {metric: slams for metric, slams in having.items() if slams}
-    if not having:
-        return []
-    if len(study.levels) == 1:
+
+    def cell(metric: Metric, level: float, slam: str) -> Cell:
+        rated = [study.level(scene, level, one, metric.key) for one in having[metric]
+                 if not one.startswith(ORACLE)]  # fmt: skip
+        row = study.level(scene, level, slam, metric.key)
+        is_best = row in rated and row and not study.few and row["value"] == _best(rated, metric)
+        return _value(row, metric, "best" if is_best else "")
+
+    if len(study.levels) == 1 and having:
         slams = [slam for slam in study.slams if any(slam in own for own in having.values())]
-        return [_at_one_level(study, scene, list(having), slams)]
+        at = study.levels[0]
+        return [
+            _grid(f"{scene} at {study.axis} {at:g}", "SLAM", slams, list(having),
+                  lambda slam, metric: cell(metric, at, slam))
+        ]  # fmt: skip
     alone: dict[str, list[Metric]] = {}
-    made = []
     for metric, slams in having.items():
         if len(slams) == 1:
             alone.setdefault(slams[0], []).append(metric)
-        else:
-            made.append(_of_metric(study, scene, metric, slams))
-    return made + [_of_slam(study, scene, slam, own) for slam, own in alone.items()]
-
-
-def _having(study: Study, scene: str, metric: Metric) -> list[str]:
     return [
-        slam
-        for slam in study.slams
-        if any(study.level(scene, level, slam, metric.key) for level in study.levels)
-    ]
-
-
-def _of_metric(study: Study, scene: str, metric: Metric, slams: Sequence[str]) -> Table:
-    rows = [
-        [Cell(text=f"{level:g}"), *_values(study, scene, level, metric, slams)]
-        for level in study.levels
-    ]
-    return Table(caption=metric.heading, head=[study.axis, *slams], rows=rows, slams=slams)
-
-
-def _of_slam(study: Study, scene: str, slam: str, metrics: Sequence[Metric]) -> Table:
-    rows = [
-        [
-            Cell(text=f"{level:g}"),
-            *(_values(study, scene, level, metric, [slam])[0] for metric in metrics),
-        ]
-        for level in study.levels
-    ]
-    return Table(caption=slam, head=[study.axis, *(m.heading for m in metrics)], rows=rows)
-
-
-def _at_one_level(
-    study: Study, scene: str, metrics: Sequence[Metric], slams: Sequence[str]
-) -> Table:
-    level = study.levels[0]
-    columns = [_values(study, scene, level, metric, slams) for metric in metrics]
-    rows = [[Cell(text=slam), *(column[k] for column in columns)] for k, slam in enumerate(slams)]
-    caption = f"{scene} at {study.axis} {level:g}"
-    return Table(caption=caption, head=["SLAM", *(m.heading for m in metrics)], rows=rows)
-
-
-def _values(
-    study: Study, scene: str, level: float, metric: Metric, slams: Sequence[str]
-) -> list[Cell]:
-    """Of one level and measure; the best is marked where there are runs enough."""
-    found = [study.level(scene, level, slam, metric.key) for slam in slams]
-    rated = [r for r, slam in zip(found, slams, strict=True) if not slam.startswith(ORACLE)]
-    best = None if study.few else _best(rated, metric)
-    return [
-        _value(row, metric, "best" if row in rated and row and row["value"] == best else "")
-        for row in found
-    ]
+        *(
+            _grid(metric.heading, study.axis, study.levels, slams,
+                  partial(cell, metric), slams)
+            for metric, slams in having.items() if len(slams) > 1
+        ),
+        *(
+            _grid(slam, study.axis, study.levels, own,
+                  lambda level, metric: cell(metric, level, having[metric][0]))
+            for slam, own in alone.items()
+        ),
+    ]  # fmt: skip
 
 
 def _best(rows: Sequence[Row | None], metric: Metric) -> float | None:
@@ -131,35 +123,24 @@ def of_pairs(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]
     """
     subject, rivals, levels = study.subject, study.rivals, study.levels
 
-    def cells(level: float, metric: Metric, rival: str) -> Cell:
+    def cell(metric: Metric, level: float, rival: str) -> Cell:
         return _difference(study.pair(scene, level, metric.key, subject, rival), metric)
 
     if len(rivals) == 1:
-        rows = [
-            [Cell(text=f"{level:g}"), *(cells(level, metric, rivals[0]) for metric in metrics)]
-            for level in levels
-        ]
-        head = [study.axis, *(metric.heading for metric in metrics)]
-        return [Table(caption=f"{subject} minus {rivals[0]}", head=head, rows=rows)]
+        return [
+            _grid(f"{subject} minus {rivals[0]}", study.axis, levels, metrics,
+                  lambda level, metric: cell(metric, level, rivals[0]))
+        ]  # fmt: skip
     if len(levels) == 1:
-        rows = [
-            [Cell(text=rival), *(cells(levels[0], metric, rival) for metric in metrics)]
-            for rival in rivals
-        ]
-        head = [f"{subject} minus", *(metric.heading for metric in metrics)]
-        return [Table(caption=f"{scene} at {study.axis} {levels[0]:g}", head=head, rows=rows)]
+        return [
+            _grid(f"{scene} at {study.axis} {levels[0]:g}", f"{subject} minus", rivals, metrics,
+                  lambda rival, metric: cell(metric, levels[0], rival))
+        ]  # fmt: skip
     return [
-        Table(
-            caption=f"{metric.heading}: {subject} minus …",
-            head=[study.axis, *rivals],
-            rows=[
-                [Cell(text=f"{level:g}"), *(cells(level, metric, rival) for rival in rivals)]
-                for level in levels
-            ],
-            slams=rivals,
-        )
+        _grid(f"{metric.heading}: {subject} minus …", study.axis, levels, rivals,
+              partial(cell, metric), rivals)
         for metric in metrics
-    ]
+    ]  # fmt: skip
 
 
 def _difference(row: Row | None, metric: Metric) -> Cell:
@@ -179,31 +160,25 @@ def of_outcomes(study: Study) -> list[Table]:
 
     At one level it is one table with a column for each scene.
     """
+
+    def cell(scene: str, slam: str, level: float) -> Cell:
+        ended = Counter(row["outcome"] for row in study.runs(scene, level, slam))
+        rest = [f"{ended[word]} {word}" for word in OUTCOMES[1:] if ended[word]]
+        text = f"{ended['finished']} of {ended.total()}"
+        return Cell(text=text, small=", ".join(rest), mark="worse" if rest else "")
+
     head = f"finished at {study.axis}"
     if len(study.levels) == 1:
         at = study.levels[0]
-        columns = [(scene, scene, at) for scene in study.scenes]
-        return [_outcomes(study, columns, f"{head} {at:g}", "finished")]
+        return [
+            _grid(f"{head} {at:g}", "finished", study.slams, study.scenes,
+                  lambda slam, scene: cell(scene, slam, at))
+        ]  # fmt: skip
     return [
-        _outcomes(study, [(f"{level:g}", scene, level) for level in study.levels], scene, head)
+        _grid(scene, head, study.slams, study.levels,
+              partial(cell, scene))
         for scene in study.scenes
-    ]
-
-
-def _outcomes(
-    study: Study, columns: Sequence[tuple[str, str, float]], caption: str, head: str
-) -> Table:
-    """``columns``: heading, scene and level of each."""
-    rows = []
-    for slam in study.slams:
-        cells = [Cell(text=slam)]
-        for _, scene, level in columns:
-            ended = Counter(row["outcome"] for row in study.runs(scene, level, slam))
-            rest = [f"{ended[word]} {word}" for word in OUTCOMES[1:] if ended[word]]
-            text = f"{ended['finished']} of {ended.total()}"
-            cells.append(Cell(text=text, small=", ".join(rest), mark="worse" if rest else ""))
-        rows.append(cells)
-    return Table(caption=caption, head=[head, *(name for name, _, _ in columns)], rows=rows)
+    ]  # fmt: skip
 
 
 def growth(study: Study, scene: str) -> Table:
@@ -251,37 +226,19 @@ def worst(study: Study, scene: str) -> Table:
     return Table(caption=f"Worst runs of {study.subject} in {scene}", head=head, rows=rows)
 
 
-def messages(study: Study) -> list[tuple[str, int]]:
-    """Error messages of SLAMs that failed, each with its number of runs, most frequent first.
-
-    The number of the scan is left out, so that one failure is one message.
-    """
-    found = (str(row["failure"]) for row in study.compared.runs if row["failure"])
-    said = Counter(re.sub(r", scan \d+,", ",", words) for words in found)
-    return said.most_common(12)
-
-
 def costs(study: Study, keys: Sequence[str]) -> Table:
     """A row for each SLAM: medians over all runs' levels, per measure."""
+
+    def cell(slam: str, metric: Metric) -> Cell:
+        of = (slam, metric.key)
+        levels = study.compared.levels
+        found = sorted(row["value"] for row in levels if (row["slam"], row["metric"]) == of)
+        span = f"{metric.show(found[0])} to {metric.show(found[-1])}" if found else ""
+        return Cell(text=metric.show(found[len(found) // 2] if found else None), small=span)
+
+    caption = "middle of the medians of all scenes and levels, and their range"
     metrics = [METRICS[key] for key in keys if study.has(key)]
-    rows = []
-    for slam in study.slams:
-        cells = [Cell(text=slam)]
-        for metric in metrics:
-            found = [
-                row["value"]
-                for row in study.compared.levels
-                if (row["slam"], row["metric"]) == (slam, metric.key)
-            ]
-            span = f"{metric.show(min(found))} to {metric.show(max(found))}" if found else ""
-            middle = sorted(found)[len(found) // 2] if found else None
-            cells.append(Cell(text=metric.show(middle), small=span))
-        rows.append(cells)
-    return Table(
-        caption="middle of the medians of all scenes and levels, and their range",
-        head=["SLAM", *(metric.heading for metric in metrics)],
-        rows=rows,
-    )
+    return _grid(caption, "SLAM", study.slams, metrics, cell)
 
 
 def of_drive(drive: Driven) -> Table:

@@ -12,8 +12,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from scripts.metrics.judged import Judged
-from scripts.metrics.row import digits, minus
-from scripts.metrics.table import IN_RUN
+from scripts.metrics.table import IN_RUN, digits, minus
 from slam.evaluation.consistency import KeptScans
 from slam.replay import Replay, Track
 from slam.trajectory import Trajectory

@@ -89,8 +89,8 @@ def blame(
         horizon_s=horizon, top=top, repeats=repeats, who=options.named(who or []),
     )  # fmt: skip
     check([slam] if slam else [], scene)
-    from scripts.debugger.episode import Case, case_of
     from scripts.debugger.make import carry_out
+    from scripts.debugger.recording import Case, case_of
 
     if run is not None:
         case, name = case_of(run, slam, every, trust), run_name(run)
@@ -107,7 +107,7 @@ def blame(
 
 def _world(world: dict[str, Any], words: list[str], scanner: str) -> dict[str, Any]:
     """Settings of the simulation: scene, dynamism and seed, and what the options say."""
-    from scripts.debugger.episode import options_of
+    from scripts.debugger.recording import options_of
     from sim.sensors.lidar.registry import scanner_of
 
     laser = scanner_of(scanner)

@@ -38,8 +38,7 @@ def demo(
     nothing changes out of sight, unless --crowd and --change say so.
     """
     check(["shunting"], scene)
-    from scripts.pace import announce, timed
-    from scripts.single_run.run import on_scene, on_scene_work
+    from scripts.single_run.run import on_scene
     from scripts.single_run.session import Outputs
 
     outputs = Outputs(folder=out, command="demo", overwrite=overwrite, film=film, film_fps=FILM_FPS)
@@ -47,8 +46,4 @@ def demo(
     settings = held.world(scene, dynamism, seed) | {
         "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
     }  # fmt: skip
-    work = on_scene_work(["shunting"], seconds, film)
-    announce(f"{seconds:g} s of {scene}" + ", filmed" * film, [work])
-    if not plan_only:
-        with timed(work):
-            on_scene(["shunting"], settings, outputs)
+    on_scene(["shunting"], settings, outputs, plan_only=plan_only)

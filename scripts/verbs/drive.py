@@ -63,7 +63,7 @@ def drive(
 
     workers.check_jobs(jobs)
     axis, at, held = options.axis_levels(dynamism, motion, change)
-    scans = options.every_of(scanner, every, 4)
+    scans, wanted = options.every_of(scanner, every, 4), options.named(goals or [])
     plan = Plan(
         scene=scene,
         slams=slams,
@@ -72,7 +72,7 @@ def drive(
         **held,
         crowd=crowd,
         seeds=_seeds(options.named(seeds or ["5"])),
-        goals=_goals(options.named(goals or [])),
+        goals=int(wanted[0]) if len(wanted) == 1 and wanted[0].isdecimal() else wanted,
         loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=scans),
         scanner=scanner,
     )
@@ -116,7 +116,3 @@ def _seeds(words: tuple[str, ...]) -> tuple[int, ...]:
         options.whole("--seeds", numbers[0], 1, 10_000)
         return tuple(range(100, 100 + numbers[0]))
     return numbers
-
-
-def _goals(words: tuple[str, ...]) -> tuple[str, ...] | int:
-    return int(words[0]) if len(words) == 1 and words[0].isdecimal() else words

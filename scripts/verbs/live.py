@@ -18,8 +18,8 @@ from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
-    from scripts.live.network import Network
     from scripts.live.session import Opener
+    from scripts.live.view import Network
 
 PORT = 8765
 
@@ -77,9 +77,9 @@ def live(
         raise InvalidValueError(f"--speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {speed:g}")
     slams = list(with_set(slam or ["shunting"], set_ or []))
     check(slams, scene)
-    from scripts.live import gate, served, session
+    from scripts.live import served, session
 
-    allowed = [gate.origin_of(text) for text in allow_origin or []]
+    allowed = [served.origin_of(text) for text in allow_origin or []]
     served.require()
     held = options.Held(motion=motion, change=change, crowd=crowd)
     world = {**held.world(scene, dynamism, seed), "laser": scanner, **options.staged(events, robot)}
@@ -103,7 +103,7 @@ def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
 
 def _network(middleware: str, *, is_log: bool) -> Network:
     """The robot on the network; ``InvalidValueError``, ``MissingDependencyError``."""
-    from scripts.live.network import Network
+    from scripts.live.view import Network
     from slam.ros.link import domain_of_environment, open_link, open_to_others
 
     network = Network(open_link(middleware))

@@ -85,7 +85,7 @@ def render(
     _check_outputs(out, strip_to, replay)
     from scripts.film.encode import size_of
     from scripts.film.footage import open_run
-    from scripts.film.strips import evenly
+    from scripts.film.render import evenly
 
     pixels = size_of(size)
     seen = view if out is not None and not no_3d else None
@@ -113,8 +113,7 @@ def _render(
     replay: Path | None,
 ) -> None:
     from scripts.film.encode import film
-    from scripts.film.render import Snapshots, shoot, watched
-    from scripts.film.strips import strip
+    from scripts.film.render import Snapshots, shoot, strip, watched
     from scripts.live.replay import Recorder
 
     started = time.perf_counter()

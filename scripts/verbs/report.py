@@ -38,7 +38,7 @@ def report(
 
     [bold]mobilia report out/compare --subject ekf[/bold]
     """
-    from scripts.closed_loop.folder import driven, drives_in
+    from scripts.closed_loop.tables import driven, drives_in
     from scripts.report import page
     from scripts.report.answer import failed
     from scripts.report.study import check_comparison, study

@@ -79,12 +79,10 @@ def run(
     if MAP_ORACLE in slams:
         raise InvalidValueError("--oracle map is for compare and benchmark: they know the true map")
     check(slams, scene)
-    from scripts.pace import announce, timed
-
     if scene is not None:
         of_a_log = strict or flip or laser is not None or text_format is not None
         _without_a_log(strict=of_a_log, maps=bool(map_in or map_out or at))
-        from scripts.single_run.run import on_scene, on_scene_work
+        from scripts.single_run.run import on_scene
         from scripts.single_run.session import Outputs
 
         folder = out or Path("out") / f"run-{scene_name(scene)}"
@@ -94,14 +92,10 @@ def run(
             "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
             **options.staged(events, robot),
         }  # fmt: skip
-        work = on_scene_work(slams, seconds, film)
-        announce(f"{seconds:g} s of {scene}" + ", filmed" * film, [work])
-        if not plan_only:
-            with timed(work):
-                on_scene(slams, settings, outputs)
+        on_scene(slams, settings, outputs, plan_only=plan_only)
     elif log is not None:
-        from scripts.days.one import Maps
-        from scripts.single_run.run import Log, on_log, on_log_work
+        from scripts.pace import announce, timed
+        from scripts.single_run.run import Log, Maps, on_log, on_log_work
 
         maps = Maps(map_in=map_in, map_out=map_out, at=at)
         folder = out or Path("out") / f"run-{run_name(log)}"

@@ -106,7 +106,7 @@ def show(which: Which, out: Out = None, seed: Seed = 0, width: int = 1600) -> No
     import imageio.v2 as imageio
 
     import scenes
-    from scripts.scene.check import contents
+    from scripts.scene.make import contents
     from sim.view.mapview import MapView
     from slam.files import replacing
 
@@ -130,7 +130,7 @@ def check(which: Which, seed: Seed = 0) -> None:
     """
     check_names([], which)
     import scenes
-    from scripts.scene.check import problems
+    from scripts.scene.make import problems
 
     found = list(problems(scenes.build(which, seed)))
     for problem in found:
@@ -148,8 +148,8 @@ def kinds(
 
     [bold]mobilia scene kinds --out kinds.png[/bold]
     """
-    from scripts.scene.picture import kinds as known
-    from scripts.scene.picture import picture
+    from scripts.scene.make import kinds as known
+    from scripts.scene.make import picture
 
     stands, moves = known()
     say(f"stands: {', '.join(stands)}", highlight=False)

@@ -47,7 +47,7 @@ def beside_sheet(scanner: str, out: Path | None) -> None:
 
     Raises ``MobiliaError`` where the scanner departs from its data sheet.
     """
-    from scripts.card import page, pictures, rows, stated
+    from scripts.card import page, rows, stated
     from sim.sensors.lidar.registry import DEFAULT, describe
     from slam.files import make_folder
 
@@ -55,12 +55,12 @@ def beside_sheet(scanner: str, out: Path | None) -> None:
     with working("measuring"):
         measured = rows.rows() if usual else stated.rows_of(scanner)
     cells = [row.cells() for row in measured]
-    console.print(page.printed(f"{describe(scanner)} (simulated)", page.HEADINGS, cells))
+    console.print(page.printed(f"{describe(scanner)} (simulated)", rows.HEADINGS, cells))
     if out is not None:
         if usual:
             make_folder(out / "pictures")
             with working("drawing what each effect does"):
-                pictures.draw(out / "pictures" / "sensor_ablation.png")
+                page.draw(out / "pictures" / "sensor_ablation.png")
         name = "sensor_card" if usual else f"sensor_card_{scanner}"
         note(f"wrote {page.write(out, name, page.page(scanner, measured))}")
     broken = [row.what for row in measured if not row.kept]

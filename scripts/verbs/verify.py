@@ -95,7 +95,7 @@ def _of_submission(
 ) -> list[Finding]:  # fmt: skip
     """A finding for each of its runs that was made again."""
     from scripts.benchmark import submission
-    from scripts.benchmark.again import made_again
+    from scripts.benchmark.submission import made_again
     from slam.names import NameFromFile
 
     given = submission.read(path)

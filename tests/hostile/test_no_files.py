@@ -10,8 +10,8 @@ from pathlib import Path
 import pytest
 
 from scripts import results
-from scripts.comparison.csv_files import read_csv
 from scripts.comparison.schema import RUNS, TABLES
+from scripts.comparison.tables import read_csv
 from scripts.output import read_recipe_words, write_recipe
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe, read_recipe

@@ -29,10 +29,9 @@ IMPORTERS = {
     "scripts/option_names.py": "names to complete, by constants",
     "slam/ros/link.py": "the two middlewares, by constants",
     "slam/settings.py": "homes of constants, by constants",
-    "scripts/live/served.py": "viser, by a constant",
+    "scripts/live/served.py": "viser, and what its messages are read with, by constants",
     "scripts/live/replay.py": "the same",
     "scripts/live/page.py": "the same",
-    "scripts/live/gate.py": "what viser's messages are read with",
     "scripts/verbs/reproduce.py": "experiments of ours",
     "scripts/experiments/study.py": "runs of ours",
 }

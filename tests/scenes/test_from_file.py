@@ -8,7 +8,7 @@ import re
 import pytest
 
 import scenes
-from scripts.scene.check import contents, problems
+from scripts.scene.make import contents, problems
 from slam.errors import InvalidValueError, MobiliaError
 
 LAB = """\

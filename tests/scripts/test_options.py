@@ -19,8 +19,7 @@ from scripts.closed_loop.runs import load
 from scripts.comparison import schema
 from scripts.comparison.make import carry_out
 from scripts.comparison.plan import Plan
-from scripts.debugger.episode import Case
-from scripts.debugger.recording import Checkpoint, record
+from scripts.debugger.recording import Case, Checkpoint, record
 from scripts.film.footage import open_run, title_of
 from scripts.options import Axis, Held, axis_levels, every_of
 from scripts.report.study import study

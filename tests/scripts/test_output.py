@@ -9,7 +9,7 @@ from pathlib import Path
 
 import pytest
 
-from scripts.closed_loop.folder import driven
+from scripts.closed_loop.tables import driven
 from scripts.comparison import folder as compared
 from scripts.comparison.again import run_of
 from scripts.names import run_name

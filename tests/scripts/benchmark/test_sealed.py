@@ -11,8 +11,8 @@ from typing import Any
 import pytest
 
 from scripts.benchmark import sealed, submission
-from scripts.benchmark.again import made_again
 from scripts.benchmark.make import Wanted, carry_out
+from scripts.benchmark.submission import made_again
 from scripts.benchmark.tracks import TEST, TRACKS, TRAIN, newest
 from slam.errors import InvalidValueError, LogFormatError
 

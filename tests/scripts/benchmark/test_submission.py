@@ -11,10 +11,11 @@ from typing import Any
 
 import pytest
 
-from scripts.benchmark import again, make, submission
+from scripts.benchmark import make, submission
 from scripts.benchmark.make import Wanted
 from scripts.benchmark.submission import Submission
 from scripts.benchmark.tracks import LEVELS, newest
+from scripts.comparison import recording
 from scripts.result_files import MAX_BYTES
 from sim.core import versions
 from sim.core.versions import WorldVersionError
@@ -161,15 +162,15 @@ def test_a_slam_may_be_submitted_by_its_own_name_only():
 def test_only_recordings_are_checked_and_only_by_the_machine_that_made_them(
     file: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr(again, "record", lambda path, **_: path.write_bytes(b""))
-    monkeypatch.setattr(again, "digest", lambda _: "0" * 64)
-    (other,) = again.made_again(file, 1)
+    monkeypatch.setattr(recording, "record", lambda path, **_: path.write_bytes(b""))
+    monkeypatch.setattr(recording, "digest", lambda _: "0" * 64)
+    (other,) = submission.made_again(file, 1)
     assert (other.verdict, other.status) == ("differs", 1)
-    monkeypatch.setattr(again, "versions", lambda: {"mujoco": "0"})
-    (other,) = again.made_again(file, 1)
+    monkeypatch.setattr(submission, "versions", lambda: {"mujoco": "0"})
+    (other,) = submission.made_again(file, 1)
     assert (other.verdict, other.ok, other.status) == ("cannot be checked here", False, 6)
-    monkeypatch.setattr(again, "digest", lambda _: f"{720:064x}")
-    assert {one.verdict for one in again.made_again(file, 10)} == {
+    monkeypatch.setattr(recording, "digest", lambda _: f"{720:064x}")
+    assert {one.verdict for one in submission.made_again(file, 10)} == {
         "same bytes", "cannot be checked here",
     }  # fmt: skip
 
@@ -196,7 +197,7 @@ def test_a_submission_of_an_older_world_is_read_but_its_scans_are_not_made_again
     monkeypatch.setattr(versions, "WORLD", versions.WORLD + 1)
     assert submission.read(file).runs == made().runs
     with pytest.raises(WorldVersionError, match=f"track {TRACK}: cannot be made again"):
-        list(again.made_again(file, 1))
+        list(submission.made_again(file, 1))
 
 
 @pytest.mark.parametrize(

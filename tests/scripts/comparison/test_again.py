@@ -15,8 +15,7 @@ from scripts.comparison import make
 from scripts.comparison.again import run_of
 from scripts.comparison.plan import Plan
 from scripts.comparison.run_file import RunFile
-from scripts.debugger.episode import case_of
-from scripts.debugger.recording import record
+from scripts.debugger.recording import case_of, record
 from scripts.film.footage import open_run
 from slam.errors import InvalidValueError, LogFormatError
 

@@ -16,7 +16,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from scripts.comparison import csv_files, folder, make
+from scripts.comparison import folder, make, tables
 from scripts.comparison.entry import lost_at
 from scripts.comparison.plan import Plan
 from scripts.comparison.rules import Table, number, word
@@ -246,7 +246,7 @@ def test_a_failure_in_a_table_is_no_formula(tmp_path):
     rows = [{"slam": "=cmd|' /C calc'!A0", "failure": "-2+3", "off": -0.5, "word": "@SUM(A1)"}]
     columns = {"slam": word(), "failure": word(), "off": number(least=-1.0), "word": word()}
     table = Table(columns=columns, key=("slam",))
-    csv_files.write_checked(tmp_path / "t.csv", rows, table)
+    tables.write_checked(tmp_path / "t.csv", rows, table)
     written = (tmp_path / "t.csv").read_text().splitlines()[1]
     assert written == "'=cmd|' /C calc'!A0,'-2+3,-0.5,'@SUM(A1)"
-    assert csv_files.read_csv(tmp_path / "t.csv", table) == rows
+    assert tables.read_csv(tmp_path / "t.csv", table) == rows

@@ -8,8 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from scripts.comparison.maps import MapJudge, disc
-from scripts.comparison.sight import BEYOND_M, Sight, seen_empty
+from scripts.comparison.maps import BEYOND_M, MapJudge, Sight, disc, seen_empty
 from tests.scripts.comparison.hand_made import HZ, WALL_M, raster, recording
 
 HERE, THERE = (2.0, 0.0), (1.5, 1.5)

@@ -4,14 +4,17 @@
 from __future__ import annotations
 
 import json
+import math
+import mmap
 import sys
 from collections.abc import Iterator
 from pathlib import Path
 
+import numpy as np
 import pytest
 
 from scripts import imports
-from scripts.comparison.entry import Entry
+from scripts.comparison.entry import Entry, PeakMemory
 from scripts.comparison.plan import Plan
 from scripts.imports import source_of
 from scripts.jobs import _digest
@@ -151,7 +154,7 @@ def test_after_a_change_in_code_of_ones_own_what_depends_on_it_is_made_again(
 def test_rows_are_scored_again_when_what_scores_them_changes():
     plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
     ((_, _, job),) = plan.entries()
-    scoring = {"entry.py", "maps.py", "sight.py", "judged.py", "row.py", "table.py"}
+    scoring = {"entry.py", "maps.py", "judged.py", "table.py"}
     assert scoring | {"slam"} <= {path.name for path in job.code}
     assert not {"tables.py", "verb.py", "plan.py"} & {path.name for path in job.code}
 
@@ -163,3 +166,33 @@ def test_a_good_one_is_charged_its_own_time_and_memory():
     assert float(str(row["ms_per_scan_p50"])) > 0.0
     if sys.platform == "linux":
         assert 0.0 <= float(str(row["peak_memory_mb"])) < 100.0
+
+
+MB = 1_000_000
+
+
+def hold_for_a_moment(mb: int) -> None:
+    """Straight from the system: what ``malloc`` gets, it may keep."""
+    if mb:
+        with mmap.mmap(-1, mb * MB) as pages:
+            np.frombuffer(pages, dtype=np.uint8)[:] = 1
+
+
+def grown(before_mb: int, within_mb: int) -> float:
+    """MB grown where so much is held for a moment before, and so much within."""
+    memory = PeakMemory()
+    hold_for_a_moment(before_mb)
+    memory.begin()
+    hold_for_a_moment(within_mb)
+    memory.end()
+    if math.isnan(memory.growth_mb):
+        pytest.skip("the kernel does not say")
+    return memory.growth_mb
+
+
+def test_what_an_update_holds_counts_even_for_a_moment():
+    assert grown(0, 80) == pytest.approx(80.0, abs=12.0)
+
+
+def test_what_is_held_elsewhere_does_not():
+    assert grown(80, 8) < 30.0

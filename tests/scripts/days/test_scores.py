@@ -8,8 +8,8 @@ import math
 import pytest
 
 from scripts.days import scores
-from scripts.days.ages import COLUMNS as AGE_COLUMNS
 from scripts.days.lifelong import COLUMNS
+from scripts.days.truth import AGE_COLUMNS
 from scripts.report import score_tables
 from slam.evaluation.statistics import median_interval, share_interval
 

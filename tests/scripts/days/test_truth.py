@@ -3,24 +3,27 @@
 
 from __future__ import annotations
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from scripts.days.lifelong import COLUMNS
-from scripts.days.report import summed
+from scripts.days.report import operator, summed
 from scripts.days.tables import last_session, printed
-from scripts.days.truth import Spot, Still, scored, stands_there
+from scripts.days.truth import Spot, Still, ages_of, scored, stands_there, verdicts
 from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.days.changes import Change
+from slam.tracker.belief.status import Status
 
 
 def spot(x, name, *, came=False, seen=True, asked=True, door=False):
     return Spot(at=(x, 0.0), name=name, came=came, seen=seen, asked=asked, door=door)
 
 
-def change(kind, *places, size=0.5):
+def change(kind, *places, size=0.5, **more):
     spots = tuple((x, 0.0) for x in places)
-    return Change(kind=kind, at=spots[-1], size_m=size, confidence=0.9, places=spots)
+    return Change(kind=kind, at=spots[-1], size_m=size, confidence=0.9, places=spots, **more)
 
 
 def test_a_moved_thing_counts_at_both_its_places():
@@ -90,3 +93,38 @@ def test_a_door_whose_leaf_has_turned_stands_there_no_more(kind, turned, there):
     )  # fmt: skip
     assert stands_there(thing, np.array([1.0, 2.0, 3.1 + turned])) == there
     assert not stands_there(thing, np.array([1.3, 2.0, 3.1]))
+
+
+def test_an_age_counts_sessions_back_and_a_session_that_lay_apart_makes_it_older():
+    assert list(ages_of(range(11), 11)) == [(1, 10), (3, 8), (10, 1)]
+    assert list(ages_of([0, 1, 3], 5)) == [(1, 3), (3, 1)]
+    assert list(ages_of([], 5)) == []
+    assert list(ages_of([4], 5)) == [(1, 4)]
+
+
+def test_the_verdict_is_asked_where_the_room_clearly_changed_and_where_it_did_not():
+    outdated, tracking = Status.OUTDATED.value, Status.TRACKING.value
+    said = [outdated, outdated, tracking, outdated, tracking]
+    estimates = [SimpleNamespace(diagnostics={"verdict": word}) for word in said]
+    shares = np.array([0.9, 0.2, 0.3, 0.0, 0.0])
+    assert verdicts(estimates, shares, 1) == {"outdated_told": 0.5, "outdated_false": 0.5}
+    assert verdicts(estimates, np.full(5, 0.05), 0) == {
+        "outdated_told": None,
+        "outdated_false": None,
+    }
+
+
+def test_doors_have_numbers_by_where_they_are_and_things_are_counted():
+    earlier = [change("door", 9.0, angle_deg=80.0), change("door", 2.0, angle_deg=-70.0)]
+    now = [
+        change("door", 9.1, angle_deg=-82.0), change("moved", 4.0, before=(5.0, 1.0)),
+        change("moved", 6.0, before=(7.0, 1.0)), change("gone", 1.0),
+    ]  # fmt: skip
+    told = operator(now, [*earlier, *now])
+    assert told == "door 2 turned by 82°, 2 things moved, 1 thing gone"
+    assert operator([], earlier) == "nothing changed that it could tell"
+    row = {"session": 3, "slam": "s", "place": "right", "found_after_s": 4.2, "map": "merged"}
+    assert last_session([row | {"tracked": 1.0}], told).endswith("found in 4 s, never lost.")
+    lost = last_session([row | {"tracked": 0.75, "place": "wrong"}], "")
+    assert lost.endswith("found in 4 s, at a wrong place, in doubt in 25 % of the scans.")
+    assert "not found in the map" in last_session([row | {"found_after_s": None}], told)

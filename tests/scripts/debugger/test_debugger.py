@@ -13,9 +13,8 @@ from typer.testing import CliRunner
 
 from scripts.cli import app
 from scripts.debugger.counterfactual import Inquest, Question, Trial, hold
-from scripts.debugger.episode import Case
 from scripts.debugger.picture import blame_picture
-from scripts.debugger.recording import Checkpoint, Tape, record
+from scripts.debugger.recording import Case, Checkpoint, Tape, record
 from scripts.debugger.words import as_json, headline
 from sim.twins.absence import Change
 from slam.errors import SlamFailedError, UnknownNameError

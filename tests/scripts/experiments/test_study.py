@@ -4,6 +4,7 @@
 from __future__ import annotations
 
 import importlib
+import re
 from pathlib import Path
 
 import numpy as np
@@ -11,11 +12,10 @@ import pytest
 
 from scripts.benchmark.tracks import TRACKS
 from scripts.comparison.recording import Recording
-from scripts.console import ended
 from scripts.experiments import ablation, study
 from scripts.experiments.study import Study, of, on_track
 from sim.simulation import Simulation, tour
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.errors import UnknownNameError
 from slam.system import create
 
 NAMES = ("ablation", "logs")
@@ -85,16 +85,6 @@ def test_what_cannot_be_run_is_told_in_a_line(tmp_path: Path, capsys):
     assert not list(tmp_path.iterdir())
 
 
-def test_an_error_of_ours_ends_an_experiment_in_a_line(capsys: pytest.CaptureFixture):
-    @ended
-    def wrong() -> int:
-        raise InvalidValueError("motion must be one of 1, 0.75, 0.5, got 0.3")
-
-    assert wrong() == 1
-    assert capsys.readouterr().err == "motion must be one of 1, 0.75, 0.5, got 0.3\n"
-    assert ended(lambda: None)() == 0
-
-
 def test_a_run_that_fails_counts_as_lost(monkeypatch: pytest.MonkeyPatch):
     from slam.odometry import OdometrySlam
 
@@ -125,3 +115,26 @@ def test_cells_of_tracks_are_geometric_means_and_losses_are_counted():
     head, _, whole, *_ = ablation.STUDY.markdown(rows).splitlines()
     assert head == "| slam | tour-guide-v1 | no-walls-v1 | all |"
     assert whole == "| shunting | 2.00, 1 of 2 | 1.00, 0 of 1 | 1.41 |"
+
+
+ROOT = Path(__file__).parents[3]
+
+
+def test_every_experiment_has_a_line():
+    page = (ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")
+    listed = set(re.findall(r"^\| `(\w+)` \|", page, flags=re.MULTILINE))
+    there = {
+        path.stem
+        for path in (ROOT / "scripts" / "experiments").glob("*.py")
+        if '__name__ == "__main__"' in path.read_text(encoding="utf-8")
+    }
+    assert listed == there
+    for link in re.findall(r"\]\((\w+\.md)\)", page):
+        assert (ROOT / "docs" / link).is_file(), link
+
+
+def test_every_module_is_named_on_a_page():
+    pages = "".join(p.read_text(encoding="utf-8") for p in (ROOT / "docs").rglob("*.md"))
+    for folder in ("experiments", "paper"):
+        for path in (ROOT / "scripts" / folder).glob("[!_]*.py"):
+            assert f"{path.name}`" in pages or f"| `{path.stem}` |" in pages, path

@@ -9,9 +9,9 @@ from types import SimpleNamespace
 import numpy as np
 import pytest
 
-from scripts.film.chart import BAND_PALE, ErrorChart, Series, _turned
+from scripts.film.chart import BAND_PALE, ErrorChart, Series
 from sim.events import KIDNAP, Event
-from sim.view.draw import GREEN, INK, MAGENTA, ORANGE, RED, paler
+from sim.view.draw import INK, MAGENTA, ORANGE, RED, paler
 from sim.view.moment import Shown
 
 COLORS = {"shunting": RED, "odometry": ORANGE}
@@ -101,17 +101,3 @@ def test_a_kidnap_is_a_line_through_everything():
     x = round(58 + (600 - 68) / 2)
     assert (picture[:, x] != still[:, x]).any(axis=1).sum() > 150
     assert (picture[215, x] == INK).all()
-
-
-def test_nothing_and_a_single_number_can_be_painted():
-    empty = chart().paint({"shunting": Series(), "odometry": Series()}, ())
-    assert empty.shape == (240, 600, 3)
-    one = series(0.02, 0.01, seconds=[0])
-    assert chart((0.0, 1.0)).paint({"shunting": one}, ()).shape == (240, 600, 3)
-    assert not (empty == GREEN).all(axis=2).any()
-
-
-def test_a_heading_beyond_the_axis_is_marked():
-    assert _turned(1.5, 2.0) == "+1.50°"
-    assert _turned(15.5, 2.0) == "+15.50° ↑"
-    assert _turned(-2.1, 2.0) == "-2.10° ↓"

@@ -6,8 +6,7 @@ from __future__ import annotations
 import numpy as np
 import pytest
 
-from scripts.film.close_up import CloseUp, off_by
-from scripts.film.map_pane import raster_picture
+from scripts.film.map_pane import CloseUp, off_by, raster_picture
 from sim.view.draw import GREEN, INK, PAPER, RED, View, robot, scale_bar
 from sim.view.moment import MOST_POINTS, Path
 from slam import se2

@@ -7,7 +7,7 @@ import numpy as np
 import pytest
 
 from scripts.film.encode import LAPSE_FPS, MOST_PICTURES, Pace
-from scripts.single_run.maps import drawn, for_file
+from scripts.single_run.session import drawn, for_file
 from sim.view import moment
 from slam import create
 from slam.frames import LaserSpec, Scan
@@ -58,7 +58,7 @@ def test_a_map_too_large_for_an_image_has_coarser_cells_and_says_so(monkeypatch)
     seen.add(Scan(stamp_ns=0, ranges=np.full(9, 2.0, np.float32), spec=SPEC), np.array([9, 9, 0]))
     assert for_file(raster, seen)[1] == ""
     assert for_file(raster, seen)[0].resolution_m == CELL
-    monkeypatch.setattr("scripts.single_run.maps.MOST_PIXELS", 125_000)
+    monkeypatch.setattr("scripts.single_run.session.MOST_PIXELS", 125_000)
     fitting, said = for_file(raster, seen)
     assert fitting.values.size <= 125_000
     assert np.nanmax(fitting.values) == np.nanmax(raster.values)

@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import random
 import socket
 import threading
 import time
@@ -16,8 +15,8 @@ from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
 from websockets.sync.server import serve
 
-from scripts.live import gate
-from scripts.live.gate import Gate, Refused, Rules
+from scripts.live import served
+from scripts.live.served import Gate, Refused, Rules
 from slam.errors import InvalidValueError
 
 PORT, FLOOD = 8765, 1 << 18
@@ -64,31 +63,12 @@ def test_two_origins_and_a_foreign_name_are_refused():
     assert not is_let_in(RULES, more=[("Host", f"127.0.0.1:{PORT}")])
 
 
-def test_500_foreign_origins_are_refused():
-    rng = random.Random(0)
-    good = [f"http://127.0.0.1:{PORT}", "https://mine.example:8443"]
-    marks = ["evil.example", *".:@/#?,x0 \t", "%00", "\u00e9"]
-    tried = 0
-    while tried < 500:
-        origin = rng.choice([*good, "http://evil.example", "null"])
-        for _ in range(rng.randint(1, 4)):
-            at = rng.randrange(len(origin) + 1)
-            cut = rng.choice([at, min(at + 1, len(origin))])
-            origin = origin[:at] + rng.choice(["", *marks]) + origin[cut:]
-        if rng.random() < 0.2:
-            origin = origin.swapcase()
-        if origin.strip(" \t") in good:
-            continue
-        tried += 1
-        assert not is_let_in(RULES, origin), origin
-
-
 def test_others_need_the_token_of_the_address():
-    token = gate.new_token("0.0.0.0")
+    token = served.new_token("0.0.0.0")
     rules = Rules(host="0.0.0.0", port=PORT, token=token)
     host = f"192.168.1.2:{PORT}"
     assert len(token) >= 20
-    assert gate.new_token("127.0.0.1") == ""
+    assert served.new_token("127.0.0.1") == ""
     assert is_let_in(rules, host=host, path=f"/{token}")
     for path in ("/", f"/{token[:-1]}", f"/{token}x", "/?token=", f"/?token={token}"):
         assert not is_let_in(rules, host=host, path=path), path
@@ -124,19 +104,13 @@ def test_the_page_is_given_to_whom_the_view_is_open_and_nothing_else_is():
     ],
 )
 def test_messages_of_the_kinds_that_a_view_needs_pass(words, passes):
-    assert gate.may_pass(msgpack.encode(words)) is passes
-
-
-def test_500_messages_of_rubbish_are_dropped():
-    rng = random.Random(0)
-    for _ in range(500):
-        assert not gate.may_pass(rng.randbytes(rng.randrange(64)))
+    assert served.may_pass(msgpack.encode(words)) is passes
 
 
 @pytest.mark.parametrize("text", ["", "example.org", "https://", "https://a.example/path"])
 def test_a_wrong_origin_of_the_user_is_told(text):
     with pytest.raises(InvalidValueError, match="--allow-origin"):
-        gate.origin_of(text)
+        served.origin_of(text)
 
 
 @pytest.fixture
@@ -144,7 +118,7 @@ def echo():
     """A server that says all again, and floods whoever asks for it."""
 
     def answer(connection):
-        heard.append(connection.request.headers.get_all(gate.SECRET))
+        heard.append(connection.request.headers.get_all(served.SECRET))
         for message in connection:
             connection.send(message)
             while b"flood" in message:
@@ -180,7 +154,7 @@ def test_messages_are_carried_and_those_of_other_kinds_are_not(opened, echo):
         msgpack.encode({"type": kind, "uuid": "x" * 200})
         for kind in ("CommandTriggerMessage", "ShareUrlRequest")
     )
-    with asked(opened, additional_headers={gate.SECRET: "guess"}) as client:
+    with asked(opened, additional_headers={served.SECRET: "guess"}) as client:
         client.send(bad)
         client.send(good)
         assert client.recv(timeout=10.0) == good
@@ -231,7 +205,7 @@ def test_nothing_of_a_foreign_page_reaches_the_server(opened, echo):
 
 
 def test_a_hundred_clients_are_told_that_eight_are_there(opened):
-    clients = [asked(opened) for _ in range(gate.MOST_CLIENTS)]
+    clients = [asked(opened) for _ in range(served.MOST_CLIENTS)]
     try:
         for _ in range(100):
             with pytest.raises(InvalidStatus, match="503"):

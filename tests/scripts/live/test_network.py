@@ -12,10 +12,9 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.live.hands import Hands
-from scripts.live.network import TAKES, Network
-from scripts.live.requests import Drive, Kidnap, MoveDoor, Push
-from scripts.live.session import Opener
+from scripts.live.playback import Drive, Kidnap, MoveDoor, Push
+from scripts.live.session import Hands, Opener
+from scripts.live.view import TAKES, Network
 from sim.moments import Moment
 from sim.recording.bag import BagWriter
 from sim.simulation import Simulation

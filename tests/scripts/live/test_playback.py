@@ -3,13 +3,27 @@
 
 from __future__ import annotations
 
+import math
 from types import SimpleNamespace
 from typing import Any
 
 import pytest
 
-from scripts.live.playback import KEPT_S, Pace, Playback
-from scripts.live.requests import MOST_WAITING, Inbox, Run, Seek, Step
+from scripts.live.playback import (
+    KEPT_S,
+    MOST_WAITING,
+    Anew,
+    Click,
+    Drive,
+    Inbox,
+    Pace,
+    Playback,
+    Run,
+    Seek,
+    Speed,
+    Step,
+)
+from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError, SlamFailedError
 
 
@@ -102,3 +116,28 @@ def test_an_inbox_that_is_full_says_so():
     inbox.refuse(InvalidValueError("a" * 1000))
     assert inbox.refused() == "a" * 300
     assert inbox.refused() is None
+
+
+@pytest.mark.parametrize(
+    ("kind", "words", "said"),
+    [
+        (Push, {"name": "x" * 101}, "push: name must be a name of up to 100 letters"),
+        (Push, {"name": "a\nb"}, "a name of up to 100 letters"),
+        (Push, {"name": 7}, "a name of up to 100 letters"),
+        (Drive, {"v": math.inf, "omega": 0.0}, "drive: v must lie in"),
+        (Drive, {"v": math.nan, "omega": 0.0}, "drive: v must be a number, got nan"),
+        (Drive, {"v": "1", "omega": 0.0}, "drive: v must be a number, got '1'"),
+        (Drive, {"v": True, "omega": 0.0}, "drive: v must be a number, got True"),
+        (MoveDoor, {"opened": 1}, "door: opened must be True or False, got 1"),
+        (Seek, {"back_s": -1.0}, "seek: back_s must lie in"),
+        (Speed, {"factor": 1e9}, r"speed: factor must lie in \[0.05, 20\]"),
+        (Kidnap, {"pose": (0.0, math.nan, 0.0)}, "kidnap: pose must be a number"),
+        (Click, {"origin": (0, 0), "direction": (0, 0, 1)}, "click: origin must be three numbers"),
+        (Click, {"origin": (0, 0, 1), "direction": (0, 0, 0)}, "must have a direction"),
+        (Anew, {"motion": 2.0}, "anew: motion must lie in"),
+        (Anew, {"slam": "x" * 500}, "anew: slam must be a name"),
+    ],
+)
+def test_a_request_that_means_nothing_is_refused_at_birth(kind, words, said):
+    with pytest.raises(InvalidValueError, match=said):
+        kind(**words)

@@ -9,9 +9,8 @@ from itertools import islice
 import numpy as np
 import pytest
 
-from scripts.live.hands import Hands
-from scripts.live.requests import Anew, Click, Drive
-from scripts.live.session import Opener
+from scripts.live.playback import Anew, Click, Drive
+from scripts.live.session import Hands, Opener
 from sim.moments import toured
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe

@@ -16,7 +16,7 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scripts.live import gate
+from scripts.live import served
 from scripts.live.replay import Recorder
 from scripts.live.session import Opener
 from scripts.live.view import View
@@ -187,8 +187,8 @@ def test_nothing_left_the_machine_and_nothing_went_wrong(browser: Browser, view:
 
 
 def test_only_loopback_is_private():
-    assert all(gate.is_loopback(host) for host in ("127.0.0.1", "localhost", "::1", "127.9.9.9"))
-    assert not any(gate.is_loopback(host) for host in ("0.0.0.0", "192.168.1.2", "a.example", ""))
+    assert all(served.is_loopback(host) for host in ("127.0.0.1", "localhost", "::1", "127.9.9.9"))
+    assert not any(served.is_loopback(host) for host in ("0.0.0.0", "192.168.1.2", "a.example", ""))
 
 
 def written(path: Path) -> Path:

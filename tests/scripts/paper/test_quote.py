@@ -10,9 +10,8 @@ import numpy as np
 import pytest
 from PIL import Image
 
-from scripts.paper.comparison import TABLE_3, paper_table
 from scripts.paper.quote import compact, quote
-from scripts.paper.report import Report, new_figure
+from scripts.paper.report import TABLE_3, Report, new_figure, paper_table
 from scripts.paper.runs import Plan
 from scripts.verbs.reproduce import EXPERIMENTS
 from slam.errors import InvalidValueError

@@ -12,7 +12,7 @@ import pytest
 from scipy.io import savemat
 
 from scripts.paper.census import Census
-from scripts.paper.comparison import below_printed
+from scripts.paper.report import below_printed
 from scripts.paper.runs import Plan, statistics
 from scripts.verbs.reproduce import EXPERIMENTS, experiment
 from scripts.verbs.reproduce import reproduce as verb

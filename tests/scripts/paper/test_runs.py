@@ -44,7 +44,7 @@ def test_a_run_depends_on_what_makes_it_and_not_on_pages():
 
     of_rooms = depends(rooms.run_one, scene="office")
     assert {"slam", "rooms.py", "runs.py", "sim", "scenes"} <= of_rooms
-    assert not {"report.py", "comparison.py", "room_pages.py"} & of_rooms
+    assert not {"report.py", "room_pages.py"} & of_rooms
     assert {"slam", "point_runs.py", "census.py"} <= depends(point_runs.run_one)
     for runs in (point_runs, park_runs):
         made_of = depends(runs.run_one)

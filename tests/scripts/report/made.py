@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
-from scripts.closed_loop import folder as drives
+from scripts.closed_loop import tables as drives
 from scripts.comparison import folder as files
 from scripts.comparison import schema, tables
-from scripts.comparison.csv_files import write_checked
+from scripts.comparison.tables import write_checked
 from scripts.days import scores
 from scripts.days.lifelong import COLUMNS as SESSION
 from scripts.output import write_recipe

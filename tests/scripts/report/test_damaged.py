@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 
 from scripts import results
-from scripts.closed_loop.folder import driven
+from scripts.closed_loop.tables import driven
 from scripts.comparison.folder import read, write_table
 from scripts.comparison.plan import Plan
 from scripts.report import pictures

@@ -15,13 +15,13 @@ import numpy as np
 
 from scripts import results
 from scripts.closed_loop import make as drives
-from scripts.closed_loop.folder import driven
 from scripts.closed_loop.plan import Plan as DrivePlan
+from scripts.closed_loop.tables import driven
 from scripts.comparison import make as comparisons
 from scripts.comparison.folder import read
 from scripts.comparison.plan import Plan
 from scripts.comparison.run_file import RunFile
-from scripts.debugger.episode import case_of
+from scripts.debugger.recording import case_of
 from scripts.film.footage import of_log
 from scripts.report import page
 from scripts.report.study import study

@@ -27,8 +27,6 @@ from slam import locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from tests.scripts.robustness.samples import (
     COMPARED,
-    damaged,
-    damages,
     made,
     misread,
     missed_by_verify,
@@ -78,14 +76,6 @@ def test_every_damage_of_other_results_is_noticed(name, tmp_path):
 def test_every_damage_of_a_comparison_is_noticed_or_made_good(comparison):
     assert missed_by_verify("comparison", comparison, 24, seed=4) == []
     assert misread("comparison", comparison, 3, seed=5) == []
-
-
-def test_damages_are_the_same_for_the_same_seed_and_leave_the_folder_as_it_was(copied, dataset):
-    assert [*damages(copied, 9, seed=5)] == [*damages(dataset, 9, seed=5)]
-    for damage in damages(dataset, 12, seed=6):
-        with damaged(copied, dataset, damage):
-            assert verdicts(copied)
-    assert not verdicts(copied)
 
 
 def append(name: str, text: str = "x") -> Callable[[Path], object]:

@@ -46,7 +46,7 @@ def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Calls:
 
     monkeypatch.setattr(os, "fsync", synced)
     monkeypatch.setattr(os, "replace", renamed)
-    monkeypatch.setattr("scripts.output.exchange", exchanged)
+    monkeypatch.setattr(files, "exchange", exchanged)
     return seen
 
 
@@ -74,7 +74,7 @@ def test_a_folder_is_synced_whole_then_named(calls: Calls, tmp_path: Path, there
 def test_where_names_cannot_be_swapped_the_new_folder_is_there(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
-    monkeypatch.setattr("scripts.output.exchange", lambda one, other: False)
+    monkeypatch.setattr(files, "exchange", lambda one, other: False)
     for text in ("old", "new"):
         with whole_folder(tmp_path / "run", overwrite=True) as part:
             files.write_text(part / "a.txt", text)

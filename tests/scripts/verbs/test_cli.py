@@ -12,7 +12,6 @@ import time
 from importlib.metadata import version
 from pathlib import Path
 
-import cv2
 import numpy as np
 import pytest
 
@@ -81,17 +80,6 @@ def test_the_files_for_other_tools_can_be_read_back(finished):
     raster = read_map(out / "map.yaml")
     assert (raster.values == 1.0).sum() > 100
     assert np.isnan(raster.values).any()
-
-
-def test_the_film_has_the_frames_of_three_seconds(finished):
-    film = cv2.VideoCapture(str(finished[0] / "film.mp4"))
-    frames = []
-    while (read := film.read())[0]:
-        frames.append(read[1])
-    film.release()
-    assert 40 <= len(frames) <= 50  # FILM_FPS of scripts.verbs.demo
-    assert frames[0].shape == (720, 1280, 3)
-    assert frames[-1].std() > 20.0
 
 
 def test_verify_tells_a_wrong_path_from_a_damaged_result(tmp_path: Path, called):

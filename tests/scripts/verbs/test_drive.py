@@ -11,8 +11,8 @@ import pytest
 from scripts.closed_loop import tables
 from scripts.closed_loop.make import carry_out
 from scripts.closed_loop.plan import Plan
-from scripts.closed_loop.runs import Driven, load, run_one
-from scripts.verbs.drive import _goals, _seeds
+from scripts.closed_loop.runs import DrivenRun, load, run_one
+from scripts.verbs.drive import _seeds
 from sim.loop import LoopConfig
 from slam.errors import OutputError
 
@@ -63,12 +63,10 @@ def test_somebody_elses_folder_is_refused(tmp_path):
         carry_out(plan(), tmp_path)
 
 
-def test_seeds_and_goals_are_a_number_or_a_list():
+def test_seeds_are_a_number_or_a_list():
     assert _seeds(("2",)) == (100, 101)
     assert _seeds(("3", "7")) == (3, 7)
     assert _seeds(("3:6",)) == (3, 4, 5)
-    assert _goals(("2",)) == 2
-    assert _goals(("lounge", "copy")) == ("lounge", "copy")
 
 
 def test_a_slam_that_cannot_be_made_has_failed_at_every_goal(tmp_path, monkeypatch):
@@ -105,7 +103,7 @@ def test_a_level_counts_goals_over_seeds_and_says_how_sure_it_is():
         identity = {"scene": "office", "dynamism": 0.5, "seed": seed, "slam": "mine"}
         rest = {"lost_s": 3.0 if seed else None, "found_s": None, "failure": ["", ""]}
         arrays = {"believed": np.zeros((2, 3)), "true": np.ones((2, 3)), "trusted": np.ones(2)}
-        runs.append(Driven(identity=identity, goals=goals, rest=rest, arrays=arrays))
+        runs.append(DrivenRun(identity=identity, goals=goals, rest=rest, arrays=arrays))
     rows = [row for run in runs for row in tables.goal_rows(run)]
     (level,) = tables.levels(rows, [tables.run_row(run) for run in runs])
     assert (level["goals"], level["reached"], level["success"]) == (4, 2, 0.5)

@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.days.one import Maps, session_of
+from scripts.single_run.run import Maps, session_of
 from slam.days.evidence import Snapshot
 from slam.days.history import History
 from slam.errors import InvalidValueError
@@ -35,7 +35,7 @@ def test_the_time_of_a_session_is_given_or_the_logs_own():
 def test_a_session_that_is_not_later_than_the_map_is_asked_for_its_time(monkeypatch):
     seen = Snapshot(time_s=5.0, cells=np.zeros((1, 2), np.int32), standing=np.ones(1, np.float32))
     history = History(cell_m=0.1, sessions=(seen,))
-    monkeypatch.setattr("scripts.days.one.read_history", lambda _: history)
+    monkeypatch.setattr("scripts.single_run.run.read_history", lambda _: history)
     stream = Stream(
         metadata=StreamMetadata(source="test", extra={"epoch_ns": 5_000_000_000}), frames=list
     )

@@ -8,8 +8,7 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
-from scripts.debugger.episode import Case
-from scripts.debugger.recording import Checkpoint, record
+from scripts.debugger.recording import Case, Checkpoint, record
 from sim.simulation import stream
 from slam.logs.carmen import write_carmen
 

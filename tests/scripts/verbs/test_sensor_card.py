@@ -14,7 +14,8 @@ import pytest
 from scripts.card import beside, stated
 from scripts.card import rows as sensor_rows
 from scripts.card.beside import simulated
-from scripts.card.page import Row, page
+from scripts.card.page import page
+from scripts.card.rows import Row
 from scripts.verbs.sensor_card import sensor_card
 from sim.sensors.lidar.registry import scanner_of
 from sim.sensors.lidar.sheet import NOT_STATED, sheet_of

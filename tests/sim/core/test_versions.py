@@ -11,7 +11,7 @@ import gymnasium
 import numpy as np
 import pytest
 
-from scripts.debugger.episode import case_of
+from scripts.debugger.recording import case_of
 from scripts.film.footage import open_run
 from scripts.output import write_recipe as write_run_recipe
 from sim.core import versions

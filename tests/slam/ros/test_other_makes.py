@@ -12,8 +12,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.live.network import Network
 from scripts.live.session import Opener
+from scripts.live.view import Network
 from slam import se2
 from slam.ros import slam as ros2
 from slam.ros.link import Topic
