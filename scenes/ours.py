@@ -40,14 +40,15 @@ def recipe(name: str) -> Callable[..., Scene]:
 
 
 def _filled(name: str, seed: int, options: dict[str, Any]) -> Scene:
-    from scenes.recipe import Draws, choice, count, finish, furnished, planned, switch
+    from scenes.recipe import Draws, count, finish, furnished, planned
+    from slam.shaped import one_of, shaped
 
     row = ROWS[name]
     for key in options:
         if key in row and key.startswith("n_"):
             options[key] = count(key, options[key], row[key])
-    glass = switch("glass", options.get("glass", False))
-    hidden = choice("walls", options.get("walls", WALLS[0]), WALLS) == "none"
+    glass = shaped("glass", options.get("glass", False), bool)
+    hidden = one_of("walls", options.get("walls", WALLS[0]), WALLS) == "none"
     plan = planned(
         name, tuple(row.get("furniture", ())), glazed=tuple(row["glass"] if glass else ()),
         hidden=hidden,

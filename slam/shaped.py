@@ -12,9 +12,10 @@ from __future__ import annotations
 
 import re
 import sys
-from dataclasses import fields
+from collections.abc import Collection
+from dataclasses import fields, is_dataclass
 from functools import cache
-from typing import Annotated, Any, get_type_hints
+from typing import Annotated, Any, cast, get_type_hints
 
 import msgspec
 import numpy as np
@@ -49,11 +50,33 @@ def shaped(owner: str, value: Any, kind: Any) -> Any:
         raise InvalidValueError(_told(owner, value, inspect.type_info(kind), said, place)) from None
 
 
+def within(owner: str, value: Any, low: float, high: float) -> float:
+    """``value`` as a float; ``InvalidValueError`` unless it is a number in [low, high]."""
+    return float(shaped(owner, value, Annotated[float, Meta(ge=low, le=high)]))
+
+
+def one_of(owner: str, value: Any, known: Collection[str]) -> str:
+    """``value``; ``InvalidValueError`` unless it is one of these words."""
+    if not isinstance(value, str) or value not in known:
+        raise InvalidValueError(f"{owner} must be one of {', '.join(known)}, got {value!r:.200}")
+    return value
+
+
+def instance(owner: str, value: Any, kind: type) -> None:
+    """Raise ``InvalidValueError`` unless ``value`` is of that class."""
+    if not isinstance(value, kind):
+        raise InvalidValueError(f"{owner} must be a {kind.__name__}, got {value!r:.80}")
+
+
 def check(config: Any) -> None:
     """Raise ``InvalidValueError`` for a field of a dataclass that is none of its annotation."""
+    name, kinds = type(config).__name__, _fields(config.__class__)
     values = {field.name: getattr(config, field.name) for field in fields(config)}
+    for field, kind in kinds.__annotations__.items():
+        if is_dataclass(kind):  # a table of its fields will not do
+            instance(f"{name}.{field}", values[field], cast(type, kind))
     plain = {k: v.item() if isinstance(v, np.generic) else v for k, v in values.items()}
-    shaped(type(config).__name__, plain, _fields(config.__class__))
+    shaped(name, plain, kinds)
 
 
 @cache
@@ -104,7 +127,9 @@ def wanted(kind: inspect.Type) -> str:
             kind.values[0]
         )  # fmt: skip
     if isinstance(kind, inspect.TupleType):
-        return f"{len(kind.item_types)} values: {', '.join(map(wanted, kind.item_types))}"
+        words = list(map(wanted, kind.item_types))
+        each = f", each {words[0]}" if len(set(words)) == 1 else f": {', '.join(words)}"
+        return f"{len(words)} values{each}"
     if isinstance(kind, inspect.StrType) and kind.pattern:
         return f"a word that matches {kind.pattern}"
     if isinstance(kind, (*_MANY, inspect.StrType)):
