@@ -120,8 +120,9 @@ def wanted(kind: inspect.Type) -> str:
     if isinstance(kind, inspect.UnionType):
         return " or ".join(map(wanted, kind.types))
     if isinstance(kind, (inspect.IntType, inspect.FloatType)):
-        number = "a whole number" if isinstance(kind, inspect.IntType) else "a number"
-        return number + _bounds(kind)
+        finite = "finite " if kind.le == MOST else ""
+        number = "whole number" if isinstance(kind, inspect.IntType) else "number"
+        return f"a {finite}{number}{_bounds(kind)}"
     if isinstance(kind, inspect.LiteralType):
         return f"one of {', '.join(map(str, kind.values))}" if len(kind.values) > 1 else str(
             kind.values[0]
@@ -146,10 +147,8 @@ def wanted(kind: inspect.Type) -> str:
 
 
 def _bounds(kind: inspect.IntType | inspect.FloatType) -> str:
-    """`` from 0 to 1``, `` > 0``, or that it is finite."""
-    low, high = kind.ge, None if kind.le == MOST else kind.le
-    if low == -MOST:
-        return ", finite"
+    """`` from 0 to 1`` or `` > 0``."""
+    low, high = (None if bound in (-MOST, MOST) else bound for bound in (kind.ge, kind.le))
     if low is not None and high is not None:
         return f" from {low:g} to {high:g}"
     words = [(">", kind.gt), (">=", low), ("<", kind.lt), ("<=", high)]

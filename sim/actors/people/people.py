@@ -22,8 +22,8 @@ from sim.actors.people import columns, crowd, gait, right_of_way, trips
 from sim.actors.people.leaders import Leaders, arrays, leaders_of
 from sim.actors.people.right_of_way import Addresses, Crowd
 from sim.core.bodies import Bodies
-from sim.core.draws import between, normal, uniform
 from sim.core.flow import Field, FlowMap, nowhere
+from sim.core.seeds import between, normal, uniform
 from sim.core.state import flat
 
 Float = NDArray[np.float64]
