@@ -10,7 +10,7 @@ all whose names differ in the number only ("chair0", "chair1", ...).
 from __future__ import annotations
 
 import math
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
 from xml.etree import ElementTree
@@ -25,6 +25,7 @@ from slam.errors import InvalidValueError
 HERE = Path(__file__).parent
 # What a plan and a part share with all others, by their folder; later ones build on earlier ones.
 SHARED = {"plans": ("parts/common.xml", "plans/world.xml"), "parts": ("parts/common.xml",)}
+LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
 MAX_BYTES = 1 << 24  # of a file from elsewhere
 
 
@@ -173,6 +174,22 @@ class Assembly:
         frame = group.worldbody.add_frame(pos=[pose[0], pose[1], 0.0], quat=quaternion(pose[2]))
         group.attach(child, frame=frame, prefix=f"{instance.removeprefix(kin)}/")
 
+    def put_mover(self, kind: str, name: str, pose: Pose, paint: Mapping[str, str]) -> Mover:
+        """Put something planar that moves; ``paint``: materials of the part by those in the file.
+
+        ``UnknownNameError`` for a kind without a row in ``scenes.kinds``.
+        """
+        person = kind_of(kind).group == "person"
+
+        def prepare(child: mujoco.MjSpec) -> None:
+            for geom in child.geoms if paint else ():
+                geom.material = paint.get(geom.material, geom.material)
+            if person:
+                _stand(child, pose)
+
+        self.put(kind, name, (0.0, 0.0, 0.0), prepare)
+        return Mover(name=name, kind=kind, radius=hull_radius(kind))
+
     def into(self, spec: mujoco.MjSpec) -> None:
         """Hand everything over to ``spec``, whose materials the parts use from now on.
 
@@ -187,6 +204,14 @@ class Assembly:
         self._groups = {}
         for camera in spec.cameras:
             camera.name = camera.name.rpartition("/")[2]
+
+
+def _stand(child: mujoco.MjSpec, pose: Pose) -> None:
+    """Put the mocap limbs under the torso; the gait moves them from then on."""
+    for limb in LIMBS:
+        body = child.body(limb)
+        x, y, yaw = moved(pose, (float(body.pos[0]), float(body.pos[1]), 0.0))
+        body.pos, body.quat = [x, y, body.pos[2]], quaternion(yaw)
 
 
 def quaternion(yaw: float) -> list[float]:

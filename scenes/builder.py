@@ -9,12 +9,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.assembly import Assembly, hull_radius, moved, part, quaternion
-from scenes.kinds import kind_of
+from scenes.assembly import Assembly, moved, part
 from scenes.plan import Plan
 from scenes.scene import Kind, Mover, Pose
 
-LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
 LEAF_HALF = 0.025  # m, half thickness of a door leaf with its trim
 TRACK = 0.11  # m from the middle of a wall to that of a leaf that slides before it
 LATCH = -0.2  # rad, where the closer of a door that rests closed would pull it: it stays shut
@@ -35,20 +33,8 @@ class Builder:
     def add(
         self, kind: Kind, name: str, pose: Pose, *, paint: Mapping[str, str] | None = None
     ) -> Mover:
-        """Put something planar that moves. ``paint`` maps material names of the part to others.
-
-        ``UnknownNameError`` for a kind without a row in ``scenes.kinds``.
-        """
-        kind_of(kind)
-
-        def prepare(child: mujoco.MjSpec) -> None:
-            for geom in child.geoms if paint else ():
-                geom.material = (paint or {}).get(geom.material, geom.material)
-            if kind_of(kind).group == "person":
-                stand(child, pose)
-
-        self._parts.put(kind, name, (0.0, 0.0, 0.0), prepare)
-        mover = Mover(name=name, kind=kind, radius=hull_radius(kind))
+        """Put something planar that moves (``Assembly.put_mover``)."""
+        mover = self._parts.put_mover(kind, name, pose, paint or {})
         self.movers.append(mover)
         self.initial[name] = pose
         return mover
@@ -119,11 +105,3 @@ class Builder:
 
     def _width(self, name: str) -> float:
         return next(m.radius for m in self.movers if m.name == name)
-
-
-def stand(child: mujoco.MjSpec, pose: Pose) -> None:
-    """Put the mocap limbs under the torso; the gait moves them from then on."""
-    for limb in LIMBS:
-        body = child.body(limb)
-        x, y, yaw = moved(pose, (float(body.pos[0]), float(body.pos[1]), 0.0))
-        body.pos, body.quat = [x, y, body.pos[2]], quaternion(yaw)

@@ -10,12 +10,16 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass, fields
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from slam.errors import InvalidValueError
+from slam.shaped import check
 
 MOST = 80  # of each kind
+Number = Annotated[int, Meta(ge=0, le=MOST)]
 GROUP = 4  # people in one
 
 
@@ -35,23 +39,18 @@ class Crowd:
               rolled, not lifted on each other
     """
 
-    escorts: int = 0
-    streams: int = 0
-    groups: int = 0
-    queue: int = 0
-    boards: int = 0
-    beds: int = 0
-    trains: int = 0
-    couches: int = 0
-    cleaners: int = 0
+    escorts: Number = 0
+    streams: Number = 0
+    groups: Number = 0
+    queue: Number = 0
+    boards: Number = 0
+    beds: Number = 0
+    trains: Number = 0
+    couches: Number = 0
+    cleaners: Number = 0
 
     def __post_init__(self) -> None:
-        for each in fields(self):
-            value = getattr(self, each.name)
-            if isinstance(value, bool) or not isinstance(value, int) or not 0 <= value <= MOST:
-                raise InvalidValueError(
-                    f"crowd: {each.name} must be a whole number in 0..{MOST}, got {value!r}"
-                )
+        check(self)
 
     def __str__(self) -> str:
         named = [f"{f.name}:{getattr(self, f.name)}" for f in fields(self) if getattr(self, f.name)]

@@ -12,12 +12,10 @@ import math
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
 
-import mujoco
 import numpy as np
 
 from scenes import look
 from scenes.assembly import Assembly, hull_radius, hulls, moved
-from scenes.builder import stand
 from scenes.crowd import GROUP, Crowd
 from scenes.kinds import kind_of
 from scenes.placement import Floor
@@ -59,15 +57,7 @@ class Filling:
     def add(self, kind: str, name: str, pose: Pose) -> None:
         """Put a mover at a pose and take its floor."""
         paint = look.dress(self.rng) if kind_of(kind).group == "person" else {}
-
-        def prepare(child: mujoco.MjSpec) -> None:
-            for geom in child.geoms if paint else ():
-                geom.material = paint.get(geom.material, geom.material)
-            if kind_of(kind).group == "person":
-                stand(child, pose)
-
-        self.parts.put(kind, name, (0.0, 0.0, 0.0), prepare)
-        self.movers.append(Mover(name=name, kind=kind, radius=hull_radius(kind)))
+        self.movers.append(self.parts.put_mover(kind, name, pose, paint))
         self.initial[name] = pose
         self.block(discs_of(kind, pose))
 

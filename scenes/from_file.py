@@ -24,14 +24,16 @@ from scenes.placement import gap_to_boxes
 from scenes.plan import Plan, furniture
 from scenes.recipe import MARGIN, START_RADIUS, Draws, finish, furnished
 from scenes.scene import Pose, Scene
-from scenes.scene_file import Box, SceneFile, Thing, Wanted, read
+from scenes.scene_file import SceneFile, Thing, Wanted, pose_of, read
 from slam.bounded import check_file
 from slam.errors import InvalidValueError
+from slam.shaped import shaped
 
 CELL_M, RIM_M = 0.05, 0.6  # cells on which the floor inside drawn walls is found, and beyond them
 BESIDE_M = 0.3  # a thing that near to a room is on its floor
 MAX_CELLS = 1 << 26
 FLOOR = "floor_concrete"
+Rect5 = tuple[float, float, float, float, float]  # x, y, half sides m, yaw rad
 
 
 def recipe(name: str) -> Callable[..., Scene]:
@@ -54,35 +56,39 @@ def recipe(name: str) -> Callable[..., Scene]:
         }  # fmt: skip
         file = read(path)
         asked = {key: value for key, value in given.items() if value is not None}
-        return _scene(file, Wanted(**{**dict(file.options), **asked}), seed)
+        return _scene(
+            file,
+            shaped("", {**{key: getattr(file, key) for key in file.given}, **asked}, Wanted),
+            seed,
+        )
 
     return from_file
 
 
 def plan_of(file: SceneFile, wanted: Wanted) -> Plan:
     """The plan of a file; made once while the files stay as they are."""
-    files = [file.path] if file.plan is None else [file.path, file.plan]
+    files = [Path(file.path), *([file.plan_path] if file.plan else [])]
     for path in files:
         check_file(path)
     stamps = [(path.stat().st_mtime_ns, path.stat().st_size) for path in files]
-    return _plan(file, str(file.path.resolve()), tuple(stamps), wanted)
+    return _plan(file, str(Path(file.path).resolve()), tuple(stamps), wanted)
 
 
 def _scene(file: SceneFile, wanted: Wanted, seed: int) -> Scene:
     doors = "open" if wanted.doors == "none" else wanted.doors
     plan = plan_of(file, wanted)
     builder = furnished(plan, Draws(seed), wanted.n_chairs, wanted.n_people, doors)
-    options = {key: getattr(wanted, key) for key in Wanted.__dataclass_fields__}
-    return finish(builder, file.path.stem, seed, options)
+    options = {key: getattr(wanted, key) for key in Wanted.__struct_fields__}
+    return finish(builder, Path(file.path).stem, seed, options)
 
 
 @lru_cache(maxsize=16)
 def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> Plan:
-    plan = _drawn(file) if file.plan is None else Plan(str(file.plan))
+    plan = Plan(str(file.plan_path)) if file.plan else _drawn(file)
     if wanted.doors == "none":
         plan.marks = tuple(mark for mark in plan.marks if mark.words[0] != "door")
     plan.furnish_marks(furniture())
-    for part, pose in file.put:
+    for part, pose in file.pieces:
         if part not in KINDS:
             plan.furnish(part, pose)
     if not wanted.seats:
@@ -90,19 +96,19 @@ def _plan(file: SceneFile, _path: str, _stamps: Any, wanted: Wanted) -> Plan:
     plan.put, standing = _movers(file, wanted, plan)
     for k, (x, y, a, b, yaw) in enumerate(standing):
         plan.wall(f"thing{k}", (x, y), (a, b), yaw)
-    for k, (hand, pose) in enumerate(file.hinges if wanted.doors != "none" else ()):
-        plan.mark(f"door:{k}:{hand}", pose)
+    for k, (x, y, yaw, hand) in enumerate(file.hinges if wanted.doors != "none" else ()):
+        plan.mark(f"door:{k}:{hand}", pose_of(x, y, yaw))
     plan.frame_doors()
     return plan.finish()
 
 
 def _movers(
     file: SceneFile, wanted: Wanted, plan: Plan
-) -> tuple[list[tuple[str, Pose]], list[Box]]:
+) -> tuple[list[tuple[str, Pose]], list[Rect5]]:
     """What moves, and the boxes of things that do not: kept, off the floor, or without room."""
-    own = [(kind, pose) for kind, pose in file.put if kind in KINDS]
+    own = [(kind, pose) for kind, pose in file.pieces if kind in KINDS]
     movers, boxes = [*plan.put, *own], plan.boxes
-    standing: list[Box] = []
+    standing: list[Rect5] = []
     for thing in file.things if wanted.furniture != "drop" else ():
         on_floor = any(
             a - BESIDE_M <= thing.at[0] <= c + BESIDE_M
@@ -111,9 +117,9 @@ def _movers(
         )
         room = on_floor and _has_room(thing, movers, boxes, plan.start)
         if wanted.furniture == "move" and room:
-            movers.append((thing.kind, thing.at))
+            movers.append((thing.kind, pose_of(*thing.at)))
         else:
-            standing += thing.boxes
+            standing += [(x, y, 0.5 * a, 0.5 * b, math.radians(c)) for x, y, a, b, c in thing.boxes]
     return movers, standing
 
 
@@ -133,7 +139,7 @@ def _footprints(file: SceneFile) -> NDArray[np.float64]:
     """(n, 5) boxes of the furniture that a file puts and that stays."""
     rows = [
         [*moved(pose, mark.pose)[:2], *mark.half, moved(pose, mark.pose)[2]]
-        for part, pose in file.put
+        for part, pose in file.pieces
         if part not in KINDS
         for mark in part_marks(part)
         if mark.words[0].startswith("footprint")
@@ -163,7 +169,7 @@ def _drawn(file: SceneFile) -> Plan:
     local, stands = np.array(boxes) - corner, _footprints(file) - corner
     found = survey(
         cells, np.ones(cells.shape, dtype=bool), local, stands,
-        start=file.start, source=str(file.path),
+        start=None if file.start is None else pose_of(*file.start), source=file.path,
     )  # fmt: skip
     middle, size = 0.5 * (low + high), 0.5 * (high - low)
     plan.spec.stat.extent, plan.spec.stat.center = float(size.max() * 2), [*middle.tolist(), 0.0]

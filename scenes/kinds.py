@@ -6,11 +6,11 @@ The physics reads ``group`` and ``feet``, the bag ``height_m``; pictures draw th
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
-from typing import Literal, get_args
+from typing import Literal
 
 from slam.errors import InvalidValueError, UnknownNameError
+from slam.shaped import NotNegative, Positive, check
 
 Group = Literal["chair", "bin", "load", "person", "door", "robot"]
 PUSHED = ("chair", "bin", "load")  # groups that a plan or a file may put
@@ -46,18 +46,13 @@ class KindOfMover:
     """
 
     group: Group
-    height_m: float
+    height_m: Positive
     feet: Feet | None = None
     part: str = ""
-    half_length_m: float = 0.0
+    half_length_m: NotNegative = 0.0
 
     def __post_init__(self) -> None:
-        if self.group not in get_args(Group):
-            raise InvalidValueError(f"group must be one of {get_args(Group)}, got {self.group!r}")
-        if not self.height_m > 0.0:
-            raise InvalidValueError(f"height_m must be > 0, got {self.height_m}")
-        if not 0.0 <= self.half_length_m < math.inf:
-            raise InvalidValueError(f"half_length_m must be >= 0, got {self.half_length_m}")
+        check(self)
 
 
 KINDS = {

@@ -22,8 +22,9 @@ from scenes.placement import gap_to_boxes
 from scenes.plan import Plan
 from scenes.recipe import Draws, count, finish, free_floor, hang_doors, scatter, seat_chairs
 from scenes.registry import register
-from scenes.scene import Pose, Scene, within
+from scenes.scene import Pose, Scene
 from slam._jit import njit
+from slam.shaped import within
 
 DEPTH = 0.7  # of the width
 WALL_HALF, OUTER_HALF = 0.06, 0.08

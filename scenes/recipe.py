@@ -6,8 +6,10 @@ from __future__ import annotations
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from scenes import look
 from scenes.assembly import reach_of
@@ -18,6 +20,7 @@ from scenes.placement import Floor
 from scenes.plan import Plan
 from scenes.scene import Kind, Pose, Scene
 from slam.errors import InvalidValueError
+from slam.shaped import one_of, shaped
 
 MARGIN = 0.03  # m between things at the start
 DOORWAY_RADIUS = 0.65  # m kept clear around the middle of a doorway
@@ -26,7 +29,7 @@ START_RADIUS = 0.7  # m of free floor around the robot
 # rad; by default doors rest open, so that every room can be reached at dynamism 0
 REST_ANGLES = {"open": (1.25, 1.75), "ajar": (0.3, 0.9), "closed": (0.0, 0.0)}
 DOORS = (*REST_ANGLES, "mixed")
-MAX_COUNT = 400
+Count = Annotated[int, Meta(ge=0, le=400)]
 Spread = tuple[tuple[float, float], float, float]
 PULLED: Spread = ((0.0, 0.25), 0.12, 0.5)  # a chair: m back (least, most), m sideways, rad turned
 ASKEW: Spread = ((-0.12, 0.12), 0.08, 0.12)  # a trolley or pallet
@@ -45,27 +48,7 @@ class Draws:
 
 def count(field: str, value: int | None, default: int) -> int:
     """An option that counts things, or its default for None."""
-    if value is None:
-        return default
-    if isinstance(value, bool) or not isinstance(value, int | np.integer):
-        raise InvalidValueError(f"{field} must be a whole number, got {value!r}")
-    if not 0 <= value <= MAX_COUNT:
-        raise InvalidValueError(f"{field} must lie in 0..{MAX_COUNT}, got {value}")
-    return int(value)
-
-
-def switch(field: str, value: bool) -> bool:
-    """An option that is on or off."""
-    if not isinstance(value, bool):
-        raise InvalidValueError(f"{field} must be True or False, got {value!r}")
-    return value
-
-
-def choice(field: str, value: str, known: Sequence[str]) -> str:
-    """An option that is one of a few words."""
-    if not isinstance(value, str) or value not in known:
-        raise InvalidValueError(f"{field} must be one of {', '.join(known)}, got {value!r:.200}")
-    return value
+    return default if value is None else int(shaped(field, value, Count))
 
 
 def free_floor(builder: Builder) -> Floor:
@@ -94,7 +77,7 @@ def hang_doors(builder: Builder, rng: np.random.Generator, doors: str = "open") 
 
     doors  "open" (held open), "ajar", "closed", or "mixed": each door one of the three
     """
-    choice("doors", doors, DOORS)
+    one_of("doors", doors, DOORS)
     for index, mark in enumerate(builder.plan.find("door")):
         rest = str(rng.choice(list(REST_ANGLES))) if doors == "mixed" else doors
         angle = float(rng.uniform(*REST_ANGLES[rest]))

@@ -11,6 +11,7 @@ from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from scenes import SCAN_HEIGHT, is_file
+from scenes.ours import ROWS, recipe
 from slam.bounded import check_file
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.names import first_line, join_folders, refuse_code
@@ -21,18 +22,9 @@ if TYPE_CHECKING:  # both load MuJoCo, and names are checked before that
 Recipe = Callable[..., "Scene"]
 F = TypeVar("F", bound=Recipe)
 _recipes: dict[str, Recipe] = {}
-OWN = {
-    "apartment": "scenes.apartment:apartment",
-    "arena": "scenes.arena:arena",
-    "classroom": "scenes.classroom:classroom",
-    "corridor": "scenes.corridor:corridor",
-    "gallery": "scenes.gallery:gallery",
-    "office": "scenes.office:office",
-    "random-rooms": "scenes.random_rooms:random_rooms",
-    "station": "scenes.station:station",
-    "warehouse": "scenes.warehouse:warehouse",
-}
-"""This project's scenes by name, as ``module:function``: imported when one is asked for."""
+_DRAWN = {"random-rooms": "scenes.random_rooms:random_rooms"}
+OWN = (*ROWS, *_DRAWN)
+"""This project's scenes; those in Python are imported when one is asked for."""
 
 
 def register(name: str) -> Callable[[F], F]:
@@ -55,8 +47,8 @@ def describe(name: str) -> str:
 
     That of a scene which is not imported yet is read from its file.
     """
-    if name in OWN and name not in _recipes:
-        return first_line(OWN[name])
+    if name in _DRAWN and name not in _recipes:
+        return first_line(_DRAWN[name])
     return (inspect.getdoc(_find(name)) or "").partition("\n")[0]
 
 
@@ -79,18 +71,18 @@ def build(
     recipe does not know or a value it cannot have, ``UntrustedNameError`` for a ``module:function``
     that was read from a file (``slam.names``).
     """
-    recipe = find(name)
+    make = find(name)
     if not isinstance(seed, int) or isinstance(seed, bool) or seed < 0:
         raise InvalidValueError(f"seed must be a whole number >= 0, got {seed!r}")
     try:
-        inspect.signature(recipe).bind(seed, **options)
+        inspect.signature(make).bind(seed, **options)
     except TypeError as error:
         raise InvalidValueError(f"scene '{name}' cannot take these options: {error}") from None
     from scenes.crowd import crowd_of
     from scenes.crowd_kinds import with_crowd
     from scenes.scene import Scene, at_scan_height
 
-    scene = recipe(seed, **options)
+    scene = make(seed, **options)
     if not isinstance(scene, Scene):
         raise UnknownNameError(f"'{name}' is no recipe: it returned {type(scene).__name__}")
     return at_scan_height(with_crowd(scene, crowd_of(crowd)), scan_height_m)
@@ -99,9 +91,9 @@ def build(
 def find(name: str) -> Recipe:
     """What makes the scene of that name; raises as ``build`` does for names."""
     if is_file(name):
-        from scenes.from_file import recipe  # MuJoCo
+        from scenes import from_file  # MuJoCo
 
-        return recipe(name)
+        return from_file.recipe(name)
     refuse_code(name, "scene")
     return _load(name) if ":" in name else _find(name)
 
@@ -125,9 +117,11 @@ def _find(name: str) -> Recipe:
     check_name(name)
     if name in _recipes:
         return _recipes[name]
-    module, _, attribute = OWN[name].partition(":")
-    recipe: Recipe = getattr(importlib.import_module(module), attribute)
-    return recipe
+    if name in ROWS:
+        return recipe(name)
+    module, _, attribute = _DRAWN[name].partition(":")
+    drawn: Recipe = getattr(importlib.import_module(module), attribute)
+    return drawn
 
 
 def _load(entry: str) -> Recipe:

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 from scenes import SCAN_HEIGHT
 from scenes.footprint import static_raster
 from scenes.kinds import Group, joint_of_door, kind_of
-from slam.errors import InvalidValueError
+from slam.shaped import within
 from slam.system import Raster
 
 Kind = str
@@ -170,16 +170,6 @@ def at_scan_height(scene: Scene, scan_height_m: float) -> Scene:
             geom.size = [geom.size[0], geom.size[1], geom.size[2] + rise]
         geom.pos = [geom.pos[0], geom.pos[1], geom.pos[2] + rise]
     return replace(scene, spec=spec, scan_height_m=height)
-
-
-def within(field: str, value: float, low: float, high: float) -> float:
-    """An option that is a number in a range."""
-    number = isinstance(value, int | float | np.floating | np.integer)
-    if isinstance(value, bool) or not number:
-        raise InvalidValueError(f"{field} must be a number, got {value!r}")
-    if not low <= value <= high:
-        raise InvalidValueError(f"{field} must lie in {low:g}..{high:g}, got {value:g}")
-    return float(value)
 
 
 def _address(model: mujoco.MjModel, joint: str) -> int:

@@ -6,84 +6,96 @@ from __future__ import annotations
 import hashlib
 import math
 import tomllib
-from collections.abc import Iterator
-from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+import msgspec
+from msgspec import Meta
 
 from scenes import is_file
 from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
-from scenes.recipe import DOORS, choice, count, switch
+from scenes.recipe import Count
 from scenes.scene import Pose
 from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError
-
-Box = tuple[float, float, float, float, float]
-Point = tuple[float, float]
+from slam.shaped import Table, one_of, shaped
 
 MAX_BYTES, MAX_PLAN_BYTES = 1 << 22, 1 << 26
-MAX_ROWS = 5000  # walls, things, doors or pieces of furniture
-FURNITURE = ("move", "keep", "drop")
-LISTS = ("walls", "rooms", "goals", "put", "things", "hinges")
-OPTIONS = ("furniture", "doors", "seats", "n_chairs", "n_people")
-MORE = ("event", "robot")  # read by others (``sim``)
-KEYS = ("plan", "wall_m", "start", *LISTS, *OPTIONS, *MORE)
+_Many = Meta(max_length=5000)  # walls, things, doors or pieces of furniture
+Metres = Annotated[float, Meta(ge=-1e4, le=1e4)]
+Size = Annotated[float, Meta(gt=0.0, le=1e4)]
+Point = tuple[Metres, Metres]
+At = tuple[Metres, Metres, Metres]  # m, m, degrees
+Line = Annotated[tuple[Point, ...], Meta(min_length=2, max_length=5000)]
 
 
-@dataclass(frozen=True, kw_only=True)
-class Thing:
-    """What moves, and the boxes (x, y, half length, half width m, yaw rad) that it is when not."""
-
-    kind: str
-    at: Pose
-    boxes: tuple[Box, ...]
-
-
-@dataclass(frozen=True, kw_only=True)
-class SceneFile:
-    """One file; ``read`` makes it.
-
-    plan     the MJCF file of walls and marks; None where ``walls`` are drawn
-    walls    polylines, (x, y) m each          wall_m  their thickness
-    start    None: the first free place        rooms   xmin, ymin, xmax, ymax m; () for all floor
-    put      kind and pose of furniture        hinges  "left" or "right", and the pose of a door's
-    options  what the scene has unless it is asked for otherwise
-    """
-
-    path: Path
-    plan: Path | None = None
-    walls: tuple[tuple[Point, ...], ...] = ()
-    wall_m: float = 0.1
-    start: Pose | None = None
-    rooms: tuple[tuple[float, float, float, float], ...] = ()
-    goals: tuple[Point, ...] = ()
-    put: tuple[tuple[str, Pose], ...] = ()
-    things: tuple[Thing, ...] = ()
-    hinges: tuple[tuple[str, Pose], ...] = ()
-    options: tuple[tuple[str, Any], ...] = ()
-
-
-@dataclass(frozen=True, kw_only=True)
-class Wanted:
-    """The options of a scene in a file, validated at birth.
+class Wanted(Table, frozen=True, kw_only=True):
+    """The options of a scene in a file.
 
     furniture  "move": things can be pushed, "keep": they stand, "drop": they are not there
     doors      "none", or how they rest          seats  whether tables bring chairs' places
     """
 
-    furniture: str = "move"
-    doors: str = "open"
+    furniture: Literal["move", "keep", "drop"] = "move"
+    doors: Literal["none", "open", "ajar", "closed", "mixed"] = "open"
     seats: bool = True
-    n_chairs: int = 0
-    n_people: int = 0
+    n_chairs: Count = 0
+    n_people: Count = 0
 
-    def __post_init__(self) -> None:
-        choice("furniture", self.furniture, FURNITURE)
-        choice("doors", self.doors, ("none", *DOORS))
-        switch("seats", self.seats)
-        count("n_chairs", self.n_chairs, 0)
-        count("n_people", self.n_people, 0)
+
+class Thing(Table, frozen=True):
+    """What moves, and the boxes (x, y, length, width m, degrees) that it is when not."""
+
+    kind: str
+    at: At
+    boxes: Annotated[
+        tuple[tuple[Metres, Metres, Size, Size, Metres], ...], Meta(min_length=1, max_length=100)
+    ]
+
+
+class SceneFile(Wanted, frozen=True, kw_only=True):
+    """One file; ``read`` makes it.
+
+    plan     the MJCF file of walls and marks; "" where ``walls`` are drawn
+    walls    polylines, (x, y) m each          wall_m  their thickness
+    start    None: the first free place        rooms   xmin, ymin, xmax, ymax m; () for all floor
+    put      kind and pose of furniture        hinges  poses of doors', and "left" or "right"
+    path     of the file                       given   which options it says
+    """
+
+    plan: Annotated[str, Meta(pattern=r"^([^\0]*\.xml)?$")] = ""
+    walls: Annotated[tuple[Line, ...], _Many] = ()
+    wall_m: Annotated[float, Meta(ge=0.01, le=1e4)] = 0.1
+    start: At | None = None
+    rooms: Annotated[tuple[tuple[Metres, Metres, Metres, Metres], ...], _Many] = ()
+    goals: Annotated[tuple[Point, ...], _Many] = ()
+    put: Annotated[tuple[tuple[str, Metres, Metres, Metres], ...], _Many] = ()
+    things: Annotated[tuple[Thing, ...], _Many] = ()
+    hinges: Annotated[
+        tuple[tuple[Metres, Metres, Metres, Literal["left", "right"]], ...], _Many
+    ] = ()
+    path: str = ""
+    given: tuple[str, ...] = ()
+
+    @property
+    def plan_path(self) -> Path:
+        """Of the MJCF file, which lies beside this one."""
+        return Path(self.path).parent / self.plan
+
+    @property
+    def pieces(self) -> list[tuple[str, Pose]]:
+        """``put``, headings in rad."""
+        return [(kind, pose_of(x, y, degrees)) for kind, x, y, degrees in self.put]
+
+
+MORE = ("event", "robot")  # keys that others read (``sim``)
+KEYS = (*(name for name in SceneFile.__struct_fields__ if name not in ("path", "given")), *MORE)
+
+
+def pose_of(x: float, y: float, degrees: float) -> Pose:
+    """A pose as files have it, in m and rad."""
+    return x, y, math.radians(degrees)
 
 
 def tables(path: Path) -> dict[str, Any]:
@@ -101,10 +113,35 @@ def tables(path: Path) -> dict[str, Any]:
 
 
 def read(path: Path) -> SceneFile:
-    """What a file says: TOML, or MJCF alone. ``InvalidValueError`` names the file and the line."""
+    """What a file says: TOML, or MJCF alone. ``InvalidValueError`` names the file and the key."""
     if path.suffix == ".xml":
-        return SceneFile(path=path, plan=path)
-    return _Reading(path, tables(path)).made()
+        return SceneFile(path=str(path), plan=path.name)
+    own = {key: value for key, value in tables(path).items() if key not in MORE}
+    try:
+        if ("walls" in own) == ("plan" in own):
+            got = "both" if "plan" in own else "neither"
+            raise InvalidValueError(f"plan or walls must be one of the two, got {got}")
+        if "plan" in own and {"rooms", "goals", "start"} & set(own):
+            raise InvalidValueError("rooms, goals and start must be marks of the plan beside plan")
+        file: SceneFile = shaped("", own, SceneFile)
+        _check(file)
+    except InvalidValueError as error:
+        raise InvalidValueError(f"{path}: {error}") from None
+    given = tuple(key for key in Wanted.__struct_fields__ if key in own)
+    return msgspec.structs.replace(file, path=str(path), given=given)
+
+
+def _check(file: SceneFile) -> None:
+    """Raise ``InvalidValueError`` for an unknown kind, and a room that is none."""
+    for k, (a, b, c, d) in enumerate(file.rooms):
+        if not (a < c and b < d):
+            got = (a, b, c, d)
+            raise InvalidValueError(f"rooms[{k}] must be [xmin, ymin, xmax, ymax], got {got}")
+    movers = [kind for kind, row in KINDS.items() if row.group in PUSHED]
+    for k, (kind, *_) in enumerate(file.put):
+        one_of(f"put[{k}]", kind, (*furniture(), *movers))
+    for k, thing in enumerate(file.things):
+        one_of(f"things[{k}].kind", thing.kind, movers)
 
 
 def files(path: Path) -> tuple[Path, ...]:
@@ -129,106 +166,3 @@ def changed(scene: str, sha256: str | None) -> str:
     if now == sha256:
         return ""
     return f"is not what was recorded, it or its plan or robot: SHA-256 then {sha256}, now {now}"
-
-
-class _Reading:
-    """One file on its way to a ``SceneFile``."""
-
-    def __init__(self, path: Path, own: dict[str, Any]) -> None:
-        self.path, self.own = path, own
-
-    def made(self) -> SceneFile:
-        drawn, named = "walls" in self.own, "plan" in self.own
-        if drawn == named:
-            raise self._wrong("plan or walls", "one of the two", "both" if drawn else "neither")
-        if named and {"rooms", "goals", "start"} & set(self.own):
-            raise self._wrong("rooms, goals and start", "marks of the plan", "keys beside plan")
-        options = {key: self.own[key] for key in OPTIONS if key in self.own}
-        try:
-            Wanted(**options)
-        except InvalidValueError as error:
-            raise InvalidValueError(f"{self.path}: {error}") from None
-        return SceneFile(
-            path=self.path,
-            plan=self._plan() if named else None,
-            walls=tuple(self._line(where, row) for where, row in self._rows("walls")),
-            wall_m=self._numbers("wall_m", [self.own.get("wall_m", 0.1)], 1, least=0.01)[0],
-            start=self._pose("start", self.own["start"]) if "start" in self.own else None,
-            rooms=tuple(self._room(where, row) for where, row in self._rows("rooms")),
-            goals=tuple(self._point(where, row) for where, row in self._rows("goals")),
-            put=tuple(self._put(where, row) for where, row in self._rows("put")),
-            things=tuple(self._thing(where, row) for where, row in self._rows("things")),
-            hinges=tuple(self._hinge(where, row) for where, row in self._rows("hinges")),
-            options=tuple(options.items()),
-        )
-
-    def _wrong(self, where: str, expected: str, got: object) -> InvalidValueError:
-        return InvalidValueError(f"{self.path}: {where} must be {expected}, got {got!r:.200}")
-
-    def _rows(self, key: str) -> Iterator[tuple[str, Any]]:
-        rows = self.own.get(key, [])
-        if not isinstance(rows, list) or len(rows) > MAX_ROWS:
-            raise self._wrong(key, f"a list of at most {MAX_ROWS}", rows)
-        return ((f"{key}[{k}]", row) for k, row in enumerate(rows))
-
-    def _numbers(self, where: str, value: object, n: int, least: float = -1e4) -> tuple[float, ...]:
-        if isinstance(value, list) and len(value) == n:
-            numbers = [v for v in value if isinstance(v, int | float) and not isinstance(v, bool)]
-            if len(numbers) == n and all(least <= v <= 1e4 for v in numbers):
-                return tuple(float(v) for v in numbers)
-        raise self._wrong(where, f"{n} numbers from {least:g} to 10000", value)
-
-    def _point(self, where: str, value: object) -> Point:
-        x, y = self._numbers(where, value, 2)
-        return x, y
-
-    def _pose(self, where: str, value: object) -> Pose:
-        x, y, degrees = self._numbers(where, value, 3)
-        return x, y, math.radians(degrees)
-
-    def _plan(self) -> Path:
-        name = self.own["plan"]
-        if not isinstance(name, str) or not name.endswith(".xml") or "\0" in name:
-            raise self._wrong("plan", "the name of an .xml file", name)
-        return self.path.parent / name
-
-    def _line(self, where: str, row: object) -> tuple[Point, ...]:
-        if not isinstance(row, list) or not 2 <= len(row) <= MAX_ROWS:
-            raise self._wrong(where, "two or more points [x, y]", row)
-        return tuple(self._point(f"{where}[{k}]", point) for k, point in enumerate(row))
-
-    def _room(self, where: str, row: object) -> tuple[float, float, float, float]:
-        a, b, c, d = self._numbers(where, row, 4)
-        if not (a < c and b < d):
-            raise self._wrong(where, "[xmin, ymin, xmax, ymax]", row)
-        return a, b, c, d
-
-    def _kind(self, where: str, kind: object, fixed: tuple[str, ...]) -> str:
-        known = sorted((*fixed, *(k for k, row in KINDS.items() if row.group in PUSHED)))
-        if kind not in known:
-            raise self._wrong(where, f"a kind that there is ({', '.join(known)})", kind)
-        return str(kind)
-
-    def _put(self, where: str, row: object) -> tuple[str, Pose]:
-        if not isinstance(row, list) or len(row) != 4:
-            raise self._wrong(where, "[kind, x, y, degrees]", row)
-        return self._kind(where, row[0], furniture()), self._pose(where, row[1:])
-
-    def _thing(self, where: str, row: object) -> Thing:
-        if not isinstance(row, dict) or set(row) != {"kind", "at", "boxes"}:
-            raise self._wrong(where, "a table of kind, at and boxes", row)
-        if not isinstance(row["boxes"], list) or not 0 < len(row["boxes"]) <= 100:
-            raise self._wrong(f"{where}.boxes", "1 to 100 boxes", row["boxes"])
-        boxes = []
-        for box in row["boxes"]:
-            x, y, long, wide, degrees = self._numbers(f"{where}.boxes", box, 5)
-            if min(long, wide) <= 0.0:
-                raise self._wrong(f"{where}.boxes", "of length and width > 0", box)
-            boxes.append((x, y, 0.5 * long, 0.5 * wide, math.radians(degrees)))
-        kind = self._kind(f"{where}.kind", row["kind"], ())
-        return Thing(kind=kind, at=self._pose(f"{where}.at", row["at"]), boxes=tuple(boxes))
-
-    def _hinge(self, where: str, row: object) -> tuple[str, Pose]:
-        if not isinstance(row, list) or len(row) != 4 or row[3] not in ("left", "right"):
-            raise self._wrong(where, '[x, y, degrees, "left" or "right"]', row)
-        return str(row[3]), self._pose(where, row[:3])

@@ -21,10 +21,10 @@ from scripts.live.view import Network, View
 from sim.view.moment import Shown
 from slam.frames import NS_PER_S
 from slam.logs.bag import stamp_of
-from slam.ros.child import Domain
-from slam.ros.heard import decoded
 from slam.ros.link import Link, open_link
+from slam.ros.node import decoded
 from slam.ros.robot import topics
+from slam.ros.slam import Domain
 from slam.ros.template import said_ns
 
 WARM_S = 5.0  # of compilers, left out

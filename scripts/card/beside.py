@@ -19,8 +19,14 @@ from sim.gym.goals import Ground
 from sim.sensors.lidar.models.lms221 import SCAN_MODES
 from sim.sensors.lidar.registry import DEFAULT, ScannerConfig, scanner_of
 from sim.simulation import Simulation, n_frames
-from slam.evaluation.scanner.card import PLAIN, SCALE, STATISTICS, ScannerCard, measure
-from slam.evaluation.scanner.edges import DEPTH_BINS_M
+from slam.evaluation.scanner.card import (
+    DEPTH_BINS_M,
+    PLAIN,
+    SCALE,
+    STATISTICS,
+    ScannerCard,
+    measure,
+)
 from slam.evaluation.scanner.figures import Figure, apart, key_of
 from slam.evaluation.scanner.noise import RANGE_BINS_M
 from slam.frames import Frame, LaserSpec, Odometry, Stream, StreamMetadata

@@ -28,7 +28,7 @@ from sim.view.moment import Shown
 from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Raster
-from slam.ros.heard import decoded, pose_of
+from slam.ros.node import decoded, pose_of
 from slam.ros.link import Link, Topic
 from slam.ros.robot import Robot
 

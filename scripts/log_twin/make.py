@@ -20,8 +20,7 @@ from scenes.scene import Scene
 from scripts.figures import save, styled
 from sim.core.dynamism import Dynamism
 from sim.sensors.odometry.fit import OdometryFit, fitted
-from sim.twins.faces import laid
-from sim.twins.log import Drive, LogTwin, scanner_like
+from sim.twins.log import Drive, LogTwin, laid, scanner_like
 from slam import create, se2
 from slam.errors import InvalidValueError
 from slam.evaluation.evidence import Beside, beside, evidence_of

@@ -28,9 +28,8 @@ from scenes.kinds import Feet, kind_of
 from scenes.scene import Scene
 from sim.actors.config import ACTORS
 from sim.actors.rolling import Rolling, inertia_of
-from sim.core.draws import between, waiting
 from sim.core.dynamism import Dynamism
-from sim.core.seeds import Seeds
+from sim.core.seeds import Seeds, between, waiting
 from slam._jit import uncounted
 from slam.errors import InvalidValueError
 

@@ -24,7 +24,7 @@ from scenes.kinds import joint_of_door
 from sim.actors.config import ACTORS
 from sim.actors.people.columns import PASSAGE
 from sim.core.bodies import Bodies
-from sim.core.draws import between, waiting
+from sim.core.seeds import between, waiting
 from sim.core.state import Record, Records, flat, record
 from slam._jit import inner
 

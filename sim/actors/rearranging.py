@@ -24,7 +24,7 @@ from scenes.arrangement import IN_ROW, MARGIN_M, Candidates, fits, places_of
 from scenes.assembly import room_of
 from scenes.scene import Mover, Pose, Scene
 from sim.core.bodies import Bodies
-from sim.core.draws import uniform
+from sim.core.seeds import uniform
 from sim.core.sight import Eye, View, hidden, opaque_boxes
 from sim.sensors.lidar.surfaces import glass_geoms
 from slam._jit import njit

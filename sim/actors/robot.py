@@ -16,10 +16,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.core.checks import check_types
 from sim.core.state import Record, record
 from slam._jit import inner
 from slam.errors import InvalidValueError
+from slam.shaped import NotNegative, Positive, check
 
 # Twist that is asked for and that the ramp has reached, m/s, rad/s; m rolled by each wheel; their
 # speeds, m/s. Then the same to the left, of wheels that roll sideways too.
@@ -40,22 +40,16 @@ class DriveConfig:
     sideways          whether its wheels roll sideways too (mecanum); v_max holds in any direction
     """
 
-    v_max: float = 1.0
-    omega_max: float = 1.5
-    accel: float = 1.0
-    alpha: float = 3.0
-    track: float = 0.33
-    turn_radius: float = 0.0
+    v_max: Positive = 1.0
+    omega_max: Positive = 1.5
+    accel: Positive = 1.0
+    alpha: Positive = 3.0
+    track: Positive = 0.33
+    turn_radius: NotNegative = 0.0
     sideways: bool = False
 
     def __post_init__(self) -> None:
-        check_types(self)
-        for name in ("v_max", "omega_max", "accel", "alpha", "track"):
-            value = getattr(self, name)
-            if not 0.0 < value < math.inf:
-                raise InvalidValueError(f"DriveConfig.{name} must be > 0, got {value}")
-        if not 0.0 <= self.turn_radius < math.inf:
-            raise InvalidValueError(f"DriveConfig.turn_radius must be >= 0, got {self.turn_radius}")
+        check(self)
 
 
 @inner

@@ -19,7 +19,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.actors.config import ACTORS
-from sim.core.draws import between, uniform
+from sim.core.seeds import between, uniform
 from sim.core.state import Records, flat, record
 from slam._jit import inner
 from slam.errors import InvalidValueError

@@ -29,9 +29,12 @@ from __future__ import annotations
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
+from typing import Annotated
 
-from sim.core.checks import check_types
+from msgspec import Meta
+
 from slam.errors import InvalidValueError
+from slam.shaped import NotNegative, Positive, Share, check, shaped
 
 
 @dataclass(frozen=True)
@@ -78,40 +81,28 @@ class Dynamism:
     push_spin_max       rad/s a shove adds in yaw, either way
     """
 
-    chair_push_rate: float = 0.0
-    bin_kick_rate: float = 0.0
-    load_push_rate: float = 0.0
-    moving_share: float | None = None
-    door_rate: float = 0.0
-    stay_mean: float = math.inf
-    pace: float = 1.0
-    crowd: float = 0.0
-    change: float = 0.0
-    push_speed_min: float = 0.25
-    push_speed_max: float = 1.5
-    kick_speed_min: float = 0.4
-    kick_speed_max: float = 2.0
-    push_spin_max: float = math.pi
+    chair_push_rate: NotNegative = 0.0
+    bin_kick_rate: NotNegative = 0.0
+    load_push_rate: NotNegative = 0.0
+    moving_share: Share | None = None
+    door_rate: NotNegative = 0.0
+    stay_mean: Annotated[float, Meta(gt=0.0)] = math.inf
+    pace: Positive = 1.0
+    crowd: Share = 0.0
+    change: Share = 0.0
+    push_speed_min: NotNegative = 0.25
+    push_speed_max: NotNegative = 1.5
+    kick_speed_min: NotNegative = 0.4
+    kick_speed_max: NotNegative = 2.0
+    push_spin_max: NotNegative = math.pi
 
     def __post_init__(self) -> None:
-        check_types(self)
-        rates = ("chair_push_rate", "bin_kick_rate", "load_push_rate", "door_rate", "push_spin_max")
-        for name in rates:
-            value = getattr(self, name)
-            if not 0.0 <= value < math.inf:
-                raise InvalidValueError(f"Dynamism.{name} must be >= 0 and finite, got {value}")
-        for name in ("stay_mean", "pace"):
-            if not getattr(self, name) > 0.0:
-                raise InvalidValueError(f"Dynamism.{name} must be > 0, got {getattr(self, name)}")
-        for name in ("moving_share", "crowd", "change"):
-            share = getattr(self, name)
-            if share is not None and not 0.0 <= share <= 1.0:
-                raise InvalidValueError(f"Dynamism.{name} must lie in [0, 1], got {share}")
+        check(self)
         for what in ("push", "kick"):
             low, high = getattr(self, f"{what}_speed_min"), getattr(self, f"{what}_speed_max")
-            if not 0.0 <= low <= high < math.inf:
+            if not low <= high:
                 raise InvalidValueError(
-                    f"Dynamism.{what}_speed_min/max must satisfy 0 <= min <= max, got {low}, {high}"
+                    f"Dynamism.{what}_speed_min/max must satisfy min <= max, got {low}, {high}"
                 )
 
     @classmethod
@@ -120,8 +111,8 @@ class Dynamism:
 
         Raises ``InvalidValueError`` outside.
         """
-        d = _level("dynamism", dynamism)
-        both = d if change is None else _level("change", change)
+        d = shaped("dynamism", dynamism, Share)
+        both = d if change is None else shaped("change", change, Share)
         return cls(**{rate.field: rate.at(d) for rate in CURVES}, change=both)
 
     @classmethod
@@ -146,15 +137,7 @@ class Dynamism:
         """
         rates = dynamism if isinstance(dynamism, Dynamism) else cls.at(dynamism)
         if motion is not None:
-            rates = cls.at(_level("motion", motion), change=rates.change)
+            rates = cls.at(shaped("motion", motion, Share), change=rates.change)
         if change is not None:
-            rates = replace(rates, change=_level("change", change))
+            rates = replace(rates, change=shaped("change", change, Share))
         return rates if moving_share is None else replace(rates, moving_share=moving_share)
-
-
-def _level(field: str, value: float) -> float:
-    if isinstance(value, bool) or not isinstance(value, (int, float)):
-        raise InvalidValueError(f"{field} must be a number in [0, 1], got {value!r}")
-    if not 0.0 <= value <= 1.0:
-        raise InvalidValueError(f"{field} must lie in [0, 1], got {value}")
-    return float(value)

@@ -8,12 +8,55 @@ part asks for a stream by name; ``Seeds(3, lidar=7)`` is run 3 with the scanner 
 from __future__ import annotations
 
 import difflib
+import math
 from collections.abc import Mapping
 
 import numpy as np
 from numpy.typing import NDArray
 
+from slam._jit import uncounted
 from slam.errors import InvalidValueError, UnknownNameError
+
+# Inside kernels a generator is one number in an array, saved with it: SplitMix64 (Steele,
+# Lea, Flood 2014, "Fast splittable pseudorandom number generators").
+_GAMMA = np.uint64(0x9E3779B97F4A7C15)
+_MIX1 = np.uint64(0xBF58476D1CE4E5B9)
+_MIX2 = np.uint64(0x94D049BB133111EB)
+
+
+@uncounted
+def uniform(counters: NDArray[np.uint64], i: int) -> float:
+    """A number in [0, 1) with 53 random bits from generator ``i``, which moves on by one."""
+    counters[i] = counters[i] + _GAMMA
+    z = counters[i]
+    z = (z ^ (z >> np.uint64(30))) * _MIX1
+    z = (z ^ (z >> np.uint64(27))) * _MIX2
+    z = z ^ (z >> np.uint64(31))
+    return float(z >> np.uint64(11)) * (1.0 / 9007199254740992.0)
+
+
+@uncounted
+def between(counters: NDArray[np.uint64], i: int, low: float, high: float) -> float:
+    """Uniform in [low, high)."""
+    return low + (high - low) * uniform(counters, i)
+
+
+@uncounted
+def waiting(counters: NDArray[np.uint64], i: int, rate: float) -> float:
+    """Time to the next event of a Poisson process, s; infinite at rate 0. Always one draw."""
+    u = 1.0 - uniform(counters, i)
+    if rate <= 0.0:
+        return math.inf
+    return -math.log(u) / rate
+
+
+@uncounted
+def normal(counters: NDArray[np.uint64], i: int) -> float:
+    """Standard normal (Box and Muller); always two draws."""
+    u = 1.0 - uniform(counters, i)
+    v = uniform(counters, i)
+    return math.sqrt(-2.0 * math.log(u)) * math.cos(2.0 * math.pi * v)
+
 
 # The position in this tuple is part of every recorded run: append, never reorder.
 STREAMS = (
@@ -56,7 +99,7 @@ class Seeds:
         return np.random.Generator(np.random.PCG64(self.sequence(stream)))
 
     def counters(self, stream: str, n: int) -> NDArray[np.uint64]:
-        """(n,) start values of the compiled generators of ``sim.core.draws``, one an actor."""
+        """(n,) start values of the compiled generators of ``sim.core.seeds``, one an actor."""
         state = self.sequence(stream).generate_state(n, np.uint64)
         return state.astype(np.uint64, copy=False)
 

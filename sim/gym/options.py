@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from scenes.crowd import crowd_of
 from scenes.registry import check_name
-from scenes.scene import HIGHEST, LOWEST, within
-from sim.core.checks import instance, numbers, switch
+from scenes.scene import HIGHEST, LOWEST
+from sim.core.checks import instance, numbers, switch, within
 from sim.core.dynamism import Dynamism
 from sim.gym.goals import Goal, goal_of
 from sim.sensors.lidar.models.lms221 import Lms221Config

@@ -13,10 +13,10 @@ from pathlib import Path
 
 from sim.core.checks import whole
 from sim.core.versions import check_world
-from sim.recording.days import FILES, write_days
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.splits import Split, checked_split, file_of, list_text, part_of
 from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
+from sim.recording.tables import FILES, write_days
 from sim.recording.verify import Finding, check_hashes, finding, listed_in, other_format
 from sim.twins.twins import TWINS
 from sim.world.times_of_day import MOST_SESSIONS

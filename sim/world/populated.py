@@ -8,15 +8,13 @@ from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
 
-import mujoco
 import numpy as np
 
 from scenes import build, look
-from scenes.assembly import Assembly, hull_radius
-from scenes.builder import stand
+from scenes.assembly import Assembly
 from scenes.crowd import Crowd, crowd_of, mix
 from scenes.crowd_kinds import with_crowd
-from scenes.scene import Mover, Scene
+from scenes.scene import Scene
 from sim.actors.rearranging import place_out
 from sim.core.checks import instance, numbers
 from sim.core.dynamism import Dynamism
@@ -87,15 +85,7 @@ def with_visitors(scene: Scene, n: int) -> Scene:
     movers, initial = [], {}
     for k in range(n):
         name, pose = f"{VISITOR}{k}", place_out(len(scene.movers) + k, scene.bounds)
-        paint = look.dress(rng)
-
-        def prepare(child: mujoco.MjSpec, paint: Any = paint, pose: Any = pose) -> None:
-            for geom in child.geoms:
-                geom.material = paint.get(geom.material, geom.material)
-            stand(child, pose)
-
-        parts.put("person", name, (0.0, 0.0, 0.0), prepare)
-        movers.append(Mover(name=name, kind="person", radius=hull_radius("person")))
+        movers.append(parts.put_mover("person", name, pose, look.dress(rng)))
         initial[name] = pose
     spec = scene.spec.copy()
     parts.into(spec)

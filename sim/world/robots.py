@@ -10,38 +10,67 @@ import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import mujoco
+from msgspec import Meta
 
 from scenes import SCAN_HEIGHT
 from scenes.scene import Scene, at_scan_height
 from sim.actors.robot import DriveConfig
-from sim.core.checks import within, word
+from sim.core.checks import word
 from slam.bounded import toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.shaped import Table, shaped
 
 FOLDER = Path(__file__).parents[1] / "robots"
 MOST_BYTES = 1 << 14
-KINDS = ("differential", "car", "omnidirectional")
 MASS_KG = 22.0  # of the scenes' robot, to which its tyres' stiffness and grip belong
-# table -> field -> (least, most), and what is so where it is not said; None: it must be said
-_FIELDS: dict[str, dict[str, tuple[float, float, float | None]]] = {
-    "": {"mass_kg": (0.1, 500.0, None), "inertia_kgm2": (1e-4, 500.0, 0.0)},
-    "footprint": {
-        "radius_m": (0.05, 1.0, 0.0), "length_m": (0.05, 2.0, 0.0), "width_m": (0.05, 2.0, 0.0),
-        "ahead_m": (-1.0, 1.0, 0.0),
-    },
-    "drive": {
-        "track_m": (0.02, 2.0, None), "turn_radius_m": (0.05, 10.0, 0.0),
-        "v_max_mps": (0.05, 5.0, None), "omega_max_radps": (0.05, 10.0, None),
-        "accel_mps2": (0.05, 20.0, 1.0), "alpha_radps2": (0.05, 50.0, 3.0),
-    },
-    "scanner": {
-        "x_m": (-1.0, 1.0, 0.0), "y_m": (-1.0, 1.0, 0.0), "yaw_deg": (-180.0, 180.0, 0.0),
-        "height_m": (0.05, 1.0, SCAN_HEIGHT),
-    },
-}  # fmt: skip
+Inertia = Annotated[float, Meta(ge=1e-4, le=500.0)]
+Length = Annotated[float, Meta(ge=0.05, le=2.0)]
+Offset = Annotated[float, Meta(ge=-1.0, le=1.0)]
+
+
+class Footprint(Table, frozen=True):
+    """A circle has ``radius_m``, a box the other two; 0: not said."""
+
+    shape: Literal["circle", "box"]
+    radius_m: Annotated[float, Meta(ge=0.05, le=1.0)] = 0.0
+    length_m: Length = 0.0
+    width_m: Length = 0.0
+    ahead_m: Offset = 0.0
+
+
+class Wheels(Table, frozen=True):
+    """Its drive; a car alone has ``turn_radius_m``."""
+
+    kind: Literal["differential", "car", "omnidirectional"]
+    track_m: Annotated[float, Meta(ge=0.02, le=2.0)]
+    v_max_mps: Annotated[float, Meta(ge=0.05, le=5.0)]
+    omega_max_radps: Annotated[float, Meta(ge=0.05, le=10.0)]
+    turn_radius_m: Annotated[float, Meta(ge=0.05, le=10.0)] = 0.0
+    accel_mps2: Annotated[float, Meta(ge=0.05, le=20.0)] = 1.0
+    alpha_radps2: Annotated[float, Meta(ge=0.05, le=50.0)] = 3.0
+
+
+class Mount(Table, frozen=True):
+    """Where its scanner is."""
+
+    x_m: Offset = 0.0
+    y_m: Offset = 0.0
+    yaw_deg: Annotated[float, Meta(ge=-180.0, le=180.0)] = 0.0
+    height_m: Annotated[float, Meta(ge=0.05, le=1.0)] = SCAN_HEIGHT
+
+
+class RobotFile(Table, frozen=True):
+    """The tables of a robot; without its inertia, that of its shape."""
+
+    name: str
+    mass_kg: Annotated[float, Meta(ge=0.1, le=500.0)]
+    footprint: Footprint
+    drive: Wheels
+    scanner: Mount
+    inertia_kgm2: Inertia = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,61 +125,33 @@ def robot_of(given: str | Mapping[str, Any] | Robot) -> Robot:
     """A robot by its name, or from its tables; ``InvalidValueError`` names the table and field."""
     if isinstance(given, Robot):
         return given
-    tables: Any = read_robot(given) if isinstance(given, str) else given
-    if not isinstance(tables, Mapping):
-        raise InvalidValueError(f"robot must be a name or its tables, got {tables!r:.80}")
-    own, foot = _numbers("", tables, {"name"}), _numbers("footprint", tables, {"shape"})
-    drive, place = _numbers("drive", tables, {"kind"}), _numbers("scanner", tables, set())
-    shape, kind = tables["footprint"].get("shape"), tables["drive"].get("kind")
-    sizes = {"circle": ("radius_m",), "box": ("length_m", "width_m")}
-    if shape not in sizes:
-        raise InvalidValueError(f"robot: footprint.shape must be circle or box, got {shape!r:.60}")
-    if kind not in KINDS:
-        raise InvalidValueError(
-            f"robot: drive.kind must be one of {', '.join(KINDS)}, got {kind!r:.60}"
-        )
+    tables = read_robot(given) if isinstance(given, str) else given
+    own: RobotFile = shaped("robot", tables, RobotFile)
+    foot, drive, place = own.footprint, own.drive, own.scanner
+    sizes = ("radius_m",) if foot.shape == "circle" else ("length_m", "width_m")
     for size in ("radius_m", "length_m", "width_m"):
-        if (foot[size] > 0.0) != (size in sizes[shape]):
+        if (getattr(foot, size) > 0.0) != (size in sizes):
             raise InvalidValueError(
-                f"robot: a {shape} has {' and '.join(sizes[shape])}, see footprint.{size}"
+                f"robot: a {foot.shape} has {' and '.join(sizes)}, see footprint.{size}"
             )
-    if (kind == "car") != (drive["turn_radius_m"] > 0.0):
+    if (drive.kind == "car") != (drive.turn_radius_m > 0.0):
         raise InvalidValueError("robot: drive.turn_radius_m is what a car has, and no other")
-    half = tuple(foot[s] if shape == "circle" else 0.5 * foot[s] for s in sizes[shape])
-    by_shape = 0.5 * half[0] ** 2 if shape == "circle" else (half[0] ** 2 + half[1] ** 2) / 3.0
+    a, b = 0.5 * foot.length_m, 0.5 * foot.width_m
+    circle = foot.shape == "circle"
+    by_shape = 0.5 * foot.radius_m**2 if circle else (a**2 + b**2) / 3.0
     return Robot(
-        name=word("robot: name", tables.get("name")),
-        mass_kg=own["mass_kg"],
-        inertia_kgm2=own["inertia_kgm2"] or own["mass_kg"] * by_shape,
-        half_m=half,
-        ahead_m=foot["ahead_m"],
+        name=word("robot: name", own.name),
+        mass_kg=own.mass_kg,
+        inertia_kgm2=own.inertia_kgm2 or own.mass_kg * by_shape,
+        half_m=(foot.radius_m,) if circle else (a, b),
+        ahead_m=foot.ahead_m,
         drive=DriveConfig(
-            v_max=drive["v_max_mps"], omega_max=drive["omega_max_radps"],
-            accel=drive["accel_mps2"], alpha=drive["alpha_radps2"], track=drive["track_m"],
-            turn_radius=drive["turn_radius_m"], sideways=kind == "omnidirectional",
+            v_max=drive.v_max_mps, omega_max=drive.omega_max_radps,
+            accel=drive.accel_mps2, alpha=drive.alpha_radps2, track=drive.track_m,
+            turn_radius=drive.turn_radius_m, sideways=drive.kind == "omnidirectional",
         ),
-        scanner=(place["x_m"], place["y_m"], math.radians(place["yaw_deg"]), place["height_m"]),
+        scanner=(place.x_m, place.y_m, math.radians(place.yaw_deg), place.height_m),
     )  # fmt: skip
-
-
-def _numbers(name: str, tables: Mapping[str, Any], words: set[str]) -> dict[str, float]:
-    """The numbers of a table, with what is so where nothing is said."""
-    table = tables if not name else tables.get(name)
-    where, known = f"robot: {name}." if name else "robot: ", _FIELDS[name]
-    if not isinstance(table, Mapping):
-        raise InvalidValueError(f"robot: {name} must be a table, got {table!r:.60}")
-    unknown = sorted(set(table) - set(known) - words - (set() if name else set(_FIELDS)))
-    if unknown:
-        raise InvalidValueError(
-            f"{where}{unknown[0]:.40} is not known, only {', '.join([*sorted(words), *known])}"
-        )
-    out = {}
-    for field, (least, most, default) in known.items():
-        if field not in table and default is not None:
-            out[field] = default
-        else:
-            out[field] = within(f"{where}{field}", table.get(field), least, most)
-    return out
 
 
 def with_robot(scene: Scene, robot: Robot) -> Scene:

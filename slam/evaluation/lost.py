@@ -19,9 +19,8 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
-from slam.checked import is_number
-from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float
+from slam.shaped import Positive, check
 
 LOST_M = 0.5  # m of position error
 LOST_RAD = math.radians(20.0)  # of heading error
@@ -39,14 +38,12 @@ class LostRule:
     is not > 0.
     """
 
-    metres: float = LOST_M
-    radians: float = LOST_RAD
-    seconds: float = LOST_S
+    metres: Positive = LOST_M
+    radians: Positive = LOST_RAD
+    seconds: Positive = LOST_S
 
     def __post_init__(self) -> None:
-        for name in ("metres", "radians", "seconds"):
-            if not getattr(self, name) > 0.0:
-                raise InvalidValueError(f"LostRule.{name} must be > 0, got {getattr(self, name)}")
+        check(self)
 
     def __str__(self) -> str:
         degrees = f"{math.degrees(self.radians):g}"
@@ -116,17 +113,12 @@ class Rule:
     threshold_m  of the rise        within_s  in which it rises       stays_s  for how long
     """
 
-    threshold_m: float = 0.25
-    within_s: float = 2.0
-    stays_s: float = 2.0
+    threshold_m: Positive = 0.25
+    within_s: Positive = 2.0
+    stays_s: Positive = 2.0
 
     def __post_init__(self) -> None:
-        for name in self.__dataclass_fields__:
-            value = getattr(self, name)
-            if not is_number(value):
-                raise InvalidValueError(f"Rule.{name} must be a number, got {value!r}")
-            if not 0.0 < value < math.inf:
-                raise InvalidValueError(f"Rule.{name} must be > 0 and finite, got {value}")
+        check(self)
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -14,13 +14,16 @@ import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields
 from itertools import pairwise
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Features, Float, Frame, Odometry, Stream, StreamMetadata, to_ns
 from slam.landmarks.filter import from_range_bearing
+from slam.shaped import NotNegative, Positive, Share, check
 
 TURNING = 0.3  # rad per square root of a second: how a moving point's heading wanders
 
@@ -41,40 +44,23 @@ class PointWorldConfig:
     sensor_std      m and rad per point
     """
 
-    side_m: float = 44.0
-    n_points: int = 130
-    moving: float = 0.0
-    speed_m_s: float = 0.6
-    n_steps: int = 220
-    step_m: float = 0.5
-    range_m: float = 12.0
-    fov_deg: float = 180.0
-    odometry_std: tuple[float, float] = (0.1, 0.03)
-    sensor_std: tuple[float, float] = (0.001, 0.001)
+    side_m: Annotated[float, Meta(ge=5.0, le=1e4)] = 44.0
+    n_points: Annotated[int, Meta(ge=0, le=100_000)] = 130
+    moving: Share = 0.0
+    speed_m_s: Annotated[float, Meta(ge=0.0, le=100.0)] = 0.6
+    n_steps: Annotated[int, Meta(ge=1, le=10_000_000)] = 220
+    step_m: NotNegative = 0.5
+    range_m: Annotated[float, Meta(ge=1e-3, le=1e4)] = 12.0
+    fov_deg: Annotated[float, Meta(ge=1.0, le=360.0)] = 180.0
+    odometry_std: tuple[Positive, Positive] = (0.1, 0.03)
+    sensor_std: tuple[Positive, Positive] = (0.001, 0.001)
 
     def __post_init__(self) -> None:
-        limits = {
-            "side_m": (5.0, 1e4),
-            "n_points": (0, 100_000),
-            "moving": (0.0, 1.0),
-            "speed_m_s": (0.0, 100.0),
-            "n_steps": (1, 10_000_000),
-            "step_m": (0.0, self.side_m / 20.0),
-            "range_m": (1e-3, 1e4),
-            "fov_deg": (1.0, 360.0),
-        }
-        for name, (low, high) in limits.items():
-            if not low <= getattr(self, name) <= high:
-                raise InvalidValueError(
-                    f"PointWorldConfig.{name} must lie in [{low}, {high}], "
-                    f"got {getattr(self, name)}"
-                )
-        for name in ("odometry_std", "sensor_std"):
-            value = getattr(self, name)
-            if len(value) != 2 or not all(0.0 < std < math.inf for std in value):
-                raise InvalidValueError(
-                    f"PointWorldConfig.{name} must be two numbers > 0, got {value}"
-                )
+        check(self)
+        if self.step_m > self.side_m / 20.0:
+            raise InvalidValueError(
+                f"PointWorldConfig.step_m must be at most side_m / 20, got {self.step_m}"
+            )
 
 
 class PointWorld:

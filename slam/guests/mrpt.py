@@ -113,7 +113,7 @@ class MrptSlam(Guest):
     """
 
     command: ClassVar[str]
-    config: ClassVar[str]  # the text of its config file; ``{folder}`` is where its logs go
+    config: ClassVar[str]  # its config file, here; ``{folder}`` in it is where its logs go
     motion: ClassVar[MotionModel]
     columns: ClassVar[tuple[int, int]]  # of its logs of the path and of times, in MRPT 2.5
     pose_columns: ClassVar[tuple[int, int, int]]  # x, y (m) and yaw (rad) in that of the path
@@ -173,7 +173,8 @@ class MrptSlam(Guest):
             for stamp_ns, (increment, ranges) in zip(stamps, self._frames, strict=True):
                 file.write(action(stamp_ns, increment, self.motion))
                 file.write(sensed(stamp_ns, ranges, self._spec))
-        (folder / "config.ini").write_text(self.config.format(folder=f"{folder}/log"))
+        config = Path(__file__).with_name(self.config).read_text(encoding="utf-8")
+        (folder / "config.ini").write_text(config.format(folder=f"{folder}/log"))
         words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
         processor_s = wire.run(words, Limits.first_s + len(stamps) * SCAN_LIMIT_S)
         rows = self._log(folder / "log" / "log_estimated_path.txt", self.columns[0])

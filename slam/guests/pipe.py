@@ -8,7 +8,6 @@ Python class the same way, so that neither its crash nor its endless loop is our
 from __future__ import annotations
 
 import json
-import math
 import os
 import shlex
 import sys
@@ -21,7 +20,6 @@ from pathlib import Path
 from typing import Any
 from weakref import ReferenceType, ref
 
-from slam.checked import is_number
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Frame, LaserSpec
 from slam.guests import protocol
@@ -30,6 +28,7 @@ from slam.guests.wire import Wire
 from slam.names import child_environment, join_folders, refuse_code
 from slam.oracle import Oracle
 from slam.path import PosePath
+from slam.shaped import Positive, check
 from slam.system import Estimate, Raster, SlamSystem, create, register_prefix
 from slam.trajectory import Trajectory
 from slam.variants import COMMANDS, PIPE, oracle_of
@@ -45,15 +44,12 @@ class Limits:
     hidden   folders of results, which hold the truth: a command sees nothing in them
     """
 
-    scan_s: float = 10.0
-    first_s: float = 120.0
+    scan_s: Positive = 10.0
+    first_s: Positive = 120.0
     hidden: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
-        for name in ("scan_s", "first_s"):
-            value = getattr(self, name)
-            if not is_number(value) or not 0.0 < value < math.inf:
-                raise InvalidValueError(f"Limits.{name} must be > 0 s and finite, got {value!r}")
+        check(self)
 
 
 @register_prefix(PIPE)

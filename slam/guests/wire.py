@@ -31,6 +31,8 @@ _SCRIPT = Path(__file__).with_name("guard.py")
 _BEGIN_S = 60.0  # for the guard's start, on a machine that is busy
 _DISMISS_S = 5.0  # for its end: it gives up earlier by itself
 _CHUNK = 1 << 16
+_DRAIN_S = 0.001
+KEPT_WORDS = 4000  # bytes of what it says
 MARK = "MOBILIA_COMMAND"  # variable that worker processes of one command have in common
 
 
@@ -73,7 +75,7 @@ class Guard:
         self._streams = [stream for stream in streams if stream is not None]
         for stream in self._streams:
             os.set_blocking(stream.fileno(), False)
-        self._status = ""
+        self._status, self._words = "", bytearray()
         try:
             seen = None if rules is None else [(os.fsencode(path), may) for path, may in rules]
             told = (encoded, variables, os.fsencode(mark), seen)
@@ -134,13 +136,25 @@ class Guard:
                         selector.unregister(key.fileobj)
         return True
 
-    def last_words(self) -> bytes:
-        """What it has left unread on its standard error."""
-        words = b""
+    def keep(self, _stream: int, data: bytes) -> bool:
+        """For ``talk``: keep the last that it says, and listen on."""
+        self._words += data
+        del self._words[:-KEPT_WORDS]
+        return False
+
+    def said(self) -> list[str]:
+        """The last lines kept, and left unread on its standard error; blanks in them made one."""
         with suppress(OSError):
             while data := os.read(self._streams[2].fileno(), _CHUNK):
-                words += data
-        return words
+                self.keep(2, data)
+        lines = self._words.decode(errors="replace").split("\n")
+        return [text for line in lines if (text := " ".join(line.split()))]
+
+    def ended(self) -> str:
+        """How it has ended, with its last words; "" where it lives. What it says is drained."""
+        self.talk(b"", time.monotonic() + _DRAIN_S, self.keep)
+        how = self.status()
+        return f"{how}; its last words: {_last(self.said())!r}" if how and self.said() else how
 
     def status(self, within_s: float = 0.0) -> str:
         """How the guest has ended, in words, "" where it lives; it is waited for so long."""
@@ -180,6 +194,23 @@ class Guard:
         except subprocess.TimeoutExpired:
             self.process.kill()
             self.process.wait()
+
+
+def started(
+    command: Sequence[str],
+    environment: Mapping[str, str],
+    rules: Sequence[tuple[str, int]] | None = None,
+) -> Guard:
+    """A ``Guard``; raises ``InvalidValueError`` for a command that cannot be started."""
+    try:
+        return Guard(command, environment, rules=rules)
+    except (OSError, ValueError) as error:
+        why = getattr(error, "strerror", None) or error
+        raise InvalidValueError(f"cannot start {command[0]!r}: {why}") from error
+
+
+def _last(lines: list[str]) -> str:
+    return " | ".join(lines[-3:])[-400:]
 
 
 def _written(descriptor: int, unsent: memoryview) -> int:
@@ -232,7 +263,6 @@ def _workers_guard(_process: int) -> str:
 
 
 MAX_LINE_BYTES = 1 << 28  # a map of 5000 x 5000 cells with all digits of a float32
-KEPT_WORDS = 4000  # bytes of its standard error
 _OUTPUT = 1
 _LEAVE_S = 1.0  # from the end of its input to the end of its life
 _STATUS_S = 0.2  # from the end of its output to the end of its life
@@ -256,15 +286,10 @@ class Wire:
         rules: Sequence[tuple[str, int]] | None = None,
     ) -> None:
         """``rules``: what it may see (``confined.rules``), None: all that we see."""
-        environment = os.environ if environment is None else environment
-        try:
-            self._guard = Guard(command, environment, rules=rules)
-        except (OSError, ValueError) as error:
-            why = getattr(error, "strerror", None) or error
-            raise InvalidValueError(f"cannot start {command[0]!r}: {why}") from error
+        self._guard = started(command, os.environ if environment is None else environment, rules)
         self._confined = rules is not None
         self._finalizer = weakref.finalize(self, self._guard.dismiss, farewell, _LEAVE_S)
-        self._heard, self._words = bytearray(), bytearray()
+        self._heard = bytearray()
 
     @property
     def pid(self) -> int:
@@ -304,9 +329,7 @@ class Wire:
     def _hear(self, stream: int, data: bytes) -> bool:
         """Take what it says; whether that ends a line. Each byte is looked at once."""
         if stream != _OUTPUT:
-            self._words += data
-            del self._words[:-KEPT_WORDS]
-            return False
+            return self._guard.keep(stream, data)
         if not data:
             status = self._guard.status(_STATUS_S)
             how = f"its process {status}" if status else "closed its standard output"
@@ -317,13 +340,12 @@ class Wire:
         return b"\n" in data
 
     def _last_words(self) -> str:
-        words = (self._words + self._guard.last_words())[-KEPT_WORDS:]
-        said = _said(words)
+        said = self._guard.said()
         refused = any(why in " ".join(said) for why in ("Permission denied", "No module named"))
         hint = ""
         if self._confined and refused:
             hint = "; it sees only its own folder: docs/bring_your_own.md"
-        return f"; its last words: {' | '.join(said[-3:])[-400:]!r}{hint}" if said else ""
+        return f"; its last words: {_last(said)!r}{hint}" if said else ""
 
     def processor_s(self) -> float | None:
         """Processor time it has used, all its threads, s; None where that cannot be known."""
@@ -350,34 +372,21 @@ def run(command: Sequence[str], limit_s: float) -> float:
     """
     before = _children_s()
     try:
-        guard = Guard(command, child_environment(guest=True))
-    except (OSError, ValueError) as error:
-        raise SlamFailedError(f"cannot start {command[0]!r}: {error}") from error
-    words = bytearray()
-
-    def heard(_stream: int, data: bytes) -> bool:
-        words.extend(data)
-        del words[:-KEPT_WORDS]
-        return False
-
+        guard = started(command, child_environment(guest=True))
+    except InvalidValueError as error:
+        raise SlamFailedError(str(error)) from error
     deadline = time.monotonic() + limit_s
     try:
         guard.end_input()
-        guard.talk(b"", deadline, heard)
-        status = guard.status(deadline - time.monotonic())
+        guard.talk(b"", deadline, guard.keep)
+        status, said = guard.status(deadline - time.monotonic()), guard.said()
     finally:
         guard.dismiss()
     if not status:
         raise SlamFailedError(f"hung: did not end within {limit_s:g} s", "hung")
     if status != "ended with status 0":
-        raise SlamFailedError(f"{command[0]!r} {status}: {' | '.join(_said(words))[-400:]!r}")
+        raise SlamFailedError(f"{command[0]!r} {status}: {_last(said)!r}")
     return _children_s() - before
-
-
-def _said(words: bytearray) -> list[str]:
-    """Its lines, but empty ones, blanks in them made one."""
-    lines = words.decode(errors="replace").split("\n")
-    return [text for line in lines if (text := " ".join(line.split()))]
 
 
 def _children_s() -> float:

@@ -9,6 +9,7 @@ import lzma
 import struct
 import sys
 import zlib
+from contextlib import suppress
 from pathlib import Path
 from typing import Any, BinaryIO, cast
 
@@ -96,51 +97,12 @@ def bound_rosbags() -> None:
     vars(ros2)["zstd"] = _Zstd
 
 
-class _Xz(io.RawIOBase):
-    """Bytes of an .xz file, streams one after the other, with a limit on the memory it takes."""
-
-    def __init__(self, path: Path) -> None:
-        self._file = path.open("rb")
-        self._decompressor = self._fresh()
-
-    @staticmethod
-    def _fresh() -> lzma.LZMADecompressor:
-        return lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=XZ_MEMORY_BYTES)
-
-    def readable(self) -> bool:
-        """It is."""
-        return True
-
-    def readinto(self, buffer: Any) -> int:
-        """The next bytes into ``buffer``; how many, 0 at the end."""
-        while True:
-            if self._decompressor.eof:
-                rest = self._decompressor.unused_data.lstrip(b"\0") or self._file.read(_STEP)
-                if not rest.strip(b"\0"):
-                    if rest:
-                        continue
-                    return 0
-                self._decompressor, given = self._fresh(), rest.lstrip(b"\0")
-            elif self._decompressor.needs_input:
-                given = self._file.read(_STEP)
-                if not given:
-                    raise EOFError("it ends before its end-of-stream marker")
-            else:
-                given = b""
-            out = self._decompressor.decompress(given, max_length=len(buffer))
-            if out:
-                buffer[: len(out)] = out
-                return len(out)
-
-    def close(self) -> None:
-        """The file, too."""
-        self._file.close()
-        super().close()
-
-
 def open_xz(path: Path) -> BinaryIO:
-    """An .xz file to read lines of; ``lzma.LZMAError`` beyond ``XZ_MEMORY_BYTES``."""
-    return cast(BinaryIO, io.BufferedReader(_Xz(path), _STEP))
+    """An .xz file to read lines of; ``lzma.LZMAError`` where it takes ``XZ_MEMORY_BYTES``."""
+    with path.open("rb") as file:
+        probe = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=XZ_MEMORY_BYTES)
+        probe.decompress(file.read(_STEP), max_length=1)
+    return cast(BinaryIO, lzma.open(path))
 
 
 _COMPRESSED, _HEADER_BYTES, _TAG_BYTES = 15, 128, 8  # of a MATLAB 5 file
@@ -157,19 +119,9 @@ def check_mat(path: Path) -> None:
         kind, size = struct.unpack_from(order + "II", data, at)
         at += _TAG_BYTES
         if kind == _COMPRESSED:
-            total += _inflated(data[at : at + size], MAX_MAT_BYTES - total)
+            with suppress(zlib.error):  # the reader says what is wrong
+                most = MAX_MAT_BYTES - total + 1
+                total += len(zlib.decompressobj().decompress(data[at : at + size], most))
             if total > MAX_MAT_BYTES:
                 raise LogFormatError(path, f"unpacks to more than {MAX_MAT_BYTES} bytes")
         at += size
-
-
-def _inflated(data: bytes, most: int) -> int:
-    """Bytes of a zlib stream, counted up to ``most + 1`` without keeping them."""
-    decompressor, count, given = zlib.decompressobj(), 0, data
-    while given and count <= most and not decompressor.eof:
-        try:
-            count += len(decompressor.decompress(given, _STEP))
-        except zlib.error:
-            return count  # the reader says what is wrong
-        given = decompressor.unconsumed_tail
-    return count

@@ -15,14 +15,13 @@ from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Odometry
 from slam.ros import messages as ros
-from slam.ros import navigation_messages as nav
 
 BEGAN = "/ground_truth/time"  # read by ``slam.logs.bag_topics``, too
 STATE = {  # by name their types, in the order of a bag's connections
-    BEGAN: nav.BeganMessage.KIND,
-    "/clock": nav.ClockMessage.KIND,
-    "/map": nav.MapMessage.KIND,
-    "/initialpose": nav.StartMessage.KIND,
+    BEGAN: ros.BeganMessage.KIND,
+    "/clock": ros.ClockMessage.KIND,
+    "/map": ros.MapMessage.KIND,
+    "/initialpose": ros.StartMessage.KIND,
     "/tf_static": ros.TransformMessage.KIND,
     "/tf": ros.TransformMessage.KIND,
     "/odom": ros.OdometryMessage.KIND,
@@ -134,19 +133,19 @@ class FrameMessages:
         self._mount = ros.TransformMessage(
             (ros.FOOTPRINT, ros.ROBOT, 0.0), (ros.ROBOT, ros.LASER, height_m)
         )
-        self._wheels, self._truth, self._clock = _Wheels(), _Truth(), nav.ClockMessage()
-        self._map = None if static_map is None else nav.MapMessage(static_map)
+        self._wheels, self._truth, self._clock = _Wheels(), _Truth(), ros.ClockMessage()
+        self._map = None if static_map is None else ros.MapMessage(static_map)
 
     def begin(self, frame: Frame) -> Iterator[Message]:
         """What is sent once, before the first frame."""
         stamp_ns = frame.stamp_ns
-        yield Message(BEGAN, stamp_ns, nav.BeganMessage()(stamp_ns))
+        yield Message(BEGAN, stamp_ns, ros.BeganMessage()(stamp_ns))
         links = self._mount(stamp_ns, se2.IDENTITY, self.spec.T_robot_laser)
         yield Message("/tf_static", stamp_ns, links)
         if self._map is not None:
             yield Message("/map", stamp_ns, self._map(stamp_ns))
         if frame.truth is not None:
-            yield Message("/initialpose", stamp_ns, nav.StartMessage()(stamp_ns, frame.truth))
+            yield Message("/initialpose", stamp_ns, ros.StartMessage()(stamp_ns, frame.truth))
 
     def state(self, frame: Frame) -> Iterator[Message]:
         """Clock, odometry and truth of a frame."""

@@ -1,24 +1,89 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an outside SLAM says, put together: its map -> odom, covariance and map."""
+"""What an outside SLAM says, put together: its map -> odom, covariance and map.
+
+Messages are bytes of strangers: bounded and checked.
+"""
 
 from __future__ import annotations
 
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
+from types import SimpleNamespace
+from typing import Any, NamedTuple
 
 import numpy as np
 
 from slam import se2
-from slam.errors import MobiliaError
+from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Estimate, Raster
 from slam.frames import NS_PER_S, Float, Odometry
 from slam.frontend.odometry_prior import turned
+from slam.logs import unpacking
+from slam.logs.bag import PLANAR, planar, stamp_of
 from slam.logs.bag_laser import PoseTrack, Stamped
-from slam.ros.heard import StampedPose, decoded, pose_of, raster_of, transform_of
 from slam.ros.link import Link, Topic
-from slam.ros.messages import MAP, ODOM, TransformMessage
-from slam.ros.navigation_messages import MapMessage, StartMessage
+from slam.ros.messages import MAP, ODOM, MapMessage, StartMessage, TransformMessage
+from slam.ros.template import STORE
+
+MOST_CELLS = 1 << 26  # of a map: a square of 400 m at 5 cm
+unpacking.bound_rosbags()
+
+
+class StampedPose(NamedTuple):
+    """A pose, and when it was so as its message says; covariance (3, 3), None: none is stated."""
+
+    stamp_ns: int
+    pose: Float
+    covariance: Float | None = None
+
+
+def decoded(kind: str, data: bytes) -> Any:
+    """The message; ``InvalidValueError`` for bytes that are none."""
+    try:
+        return STORE.deserialize_cdr(data, kind)
+    except MobiliaError:
+        raise
+    except Exception as error:  # parsers of foreign bytes fail in every way
+        raise InvalidValueError(f"{len(data)} bytes that are no {kind}: {error!s:.80}") from error
+
+
+def transform_of(message: Any, parent: str, child: str) -> StampedPose | None:
+    """That transform of a tf2_msgs/TFMessage; None where it has none."""
+    for link in message.transforms:
+        names = (link.header.frame_id.lstrip("/"), link.child_frame_id.lstrip("/"))
+        if names == (parent, child):
+            moved = link.transform
+            pose = SimpleNamespace(position=moved.translation, orientation=moved.rotation)
+            return StampedPose(stamp_of(link, 0), planar(pose))
+    return None
+
+
+def pose_of(message: Any) -> StampedPose:
+    """A geometry_msgs/PoseWithCovarianceStamped; all zeros as covariance state nothing."""
+    spread = np.asarray(message.pose.covariance)[PLANAR].astype(np.float64)
+    said = spread if np.isfinite(spread).all() and spread.any() else None
+    return StampedPose(stamp_of(message, 0), planar(message.pose.pose), said)
+
+
+def raster_of(grid: Any, T_own_map: Float) -> Raster | None:
+    """A nav_msgs/OccupancyGrid in the frame of the first pose; None for an empty one.
+
+    T_own_map  of the grid's frame in ours. Raises ``InvalidValueError`` for what cannot be a map.
+    """
+    width, height = int(grid.info.width), int(grid.info.height)
+    if width * height == 0:
+        return None
+    if width * height > MOST_CELLS or len(grid.data) != width * height:
+        raise InvalidValueError(
+            f"/map: expected width * height cells, at most {MOST_CELLS}, "
+            f"got {width} * {height} and {len(grid.data)} of them"
+        )
+    cells = grid.data.astype(np.float32).reshape(height, width) / np.float32(100.0)
+    cells[(cells < 0.0) | (cells > 1.0)] = np.nan
+    origin = se2.compose(T_own_map, planar(grid.info.origin))
+    return Raster(values=cells, resolution_m=float(grid.info.resolution), T_map_origin=origin)
+
 
 CLOCK_NS = 60 * NS_PER_S  # a stamp so far from the scan's is of another clock
 _KEPT_NS = 10 * NS_PER_S  # of odometry, that a late pose may refer to

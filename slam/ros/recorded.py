@@ -12,9 +12,8 @@ from slam.frames import NS_PER_S, Frame
 from slam.logs.bag_topics import INCREMENT, TRANSFORMS, Bag
 from slam.logs.text import about
 from slam.path import PosePath
-from slam.ros.heard import StampedPose, pose_of, transform_of
 from slam.ros.messages import MAP, ODOM
-from slam.ros.node import Statements
+from slam.ros.node import StampedPose, Statements, pose_of, transform_of
 from slam.trajectory import Trajectory
 
 APART_S = 60.0  # no stamp of the stack so near to any of the scans: its clock is another one

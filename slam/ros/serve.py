@@ -26,11 +26,9 @@ from slam.frames import NS_PER_S, Frame
 from slam.logs.bag import Assembly, stamp_of
 from slam.logs.bag_laser import Laser, mounting
 from slam.logs.bag_topics import Topics
-from slam.ros.heard import decoded
 from slam.ros.link import Link, Topic, open_link
-from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
-from slam.ros.navigation_messages import MapMessage
-from slam.ros.node import GRID, POSES, TF
+from slam.ros.messages import MAP, ODOM, IncrementMessage, MapMessage, TransformMessage
+from slam.ros.node import GRID, POSES, TF, decoded
 from slam.ros.robot import topics
 from slam.ros.template import EPOCH_NS
 from slam.system import SlamSystem, create

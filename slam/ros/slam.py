@@ -8,29 +8,96 @@ A scan is sent when the node has answered the one before, or ``ANSWER_S`` after 
 transform "map" -> "odom" on /tf with the scan's stamp or a later one; a pose on /pose or /amcl_pose
 at the stamp of a scan counts where no such transform ever came. Until the next answer the last one
 stands, carried on by odometry. No run repeats to the byte: what a node says depends on its clock.
+A node that is started here has a domain of its own.
 """
 
 from __future__ import annotations
 
+import fcntl
+import os
 import shlex
+import tempfile
 import time
 import weakref
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from pathlib import Path
 
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.estimate import Estimate, Raster
 from slam.frames import Frame
 from slam.guests.pipe import Limits
+from slam.guests.wire import Guard, started
+from slam.names import child_environment
 from slam.path import PosePath
-from slam.ros.child import Child, Domain
-from slam.ros.link import Link, open_link
+from slam.ros.link import MOST_DOMAIN, Link, domain_of_environment, open_link, open_to_others
 from slam.ros.messages import MAP, ODOM
 from slam.ros.node import Node
 from slam.ros.robot import Robot
 from slam.ros.template import said_ns
 from slam.system import register_prefix
 from slam.trajectory import Trajectory
+
+ROUTER = 7447  # port of rmw_zenohd
+LEASE_S = 15.0  # s; DDS takes an ended node for alive for 10 s, and a scan sent meanwhile is lost
+
+
+class Domain:
+    """A number that one world at a time uses on this machine: two of them would drive one node.
+
+    own  any free number but the environment's; else that one, waited for
+    """
+
+    def __init__(self, middleware: str, *, own: bool, wait_s: float) -> None:
+        self.middleware, self.own = middleware, own
+        first = domain_of_environment()
+        among = [(first + k) % (MOST_DOMAIN + 1) for k in range(1, 100)] if own else [first]
+        deadline = time.monotonic() + wait_s
+        while True:
+            for number in among:
+                if self._held(number):
+                    return
+            if time.monotonic() > deadline:
+                raise SlamFailedError(
+                    f"another run uses ROS_DOMAIN_ID {first}: let one run at a time ask this "
+                    "node, or let each start its own by ros2:COMMAND", "hung",
+                )  # fmt: skip
+            time.sleep(0.1)
+
+    def _held(self, number: int) -> bool:
+        """Whether the number is ours now."""
+        name = f"mobilia-{os.getuid()}-{self.middleware}-{number}.lock"
+        flags = os.O_RDWR | os.O_CREAT | os.O_NOFOLLOW
+        file = os.open(Path(tempfile.gettempdir(), name), flags, 0o600)
+        with suppress(BlockingIOError):
+            fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
+            used = os.fstat(file)
+            if not self.own or not used.st_size or time.time() - used.st_mtime > LEASE_S:
+                self.number, self._file = number, file
+                return True
+        os.close(file)
+        return False
+
+    @property
+    def router(self) -> int:
+        """Port of the Zenoh router."""
+        return ROUTER + self.number if self.own else ROUTER
+
+    def environment(self) -> Mapping[str, str]:
+        """Of the node."""
+        more = {"ROS_DOMAIN_ID": str(self.number)}
+        if self.middleware == "zenoh":
+            where = f'connect/endpoints=["tcp/127.0.0.1:{self.router}"]'
+            more |= {"RMW_IMPLEMENTATION": "rmw_zenoh_cpp", "ZENOH_CONFIG_OVERRIDE": where}
+        if not open_to_others():
+            more |= {"ROS_AUTOMATIC_DISCOVERY_RANGE": "LOCALHOST", "ROS_LOCALHOST_ONLY": "1"}
+        return {**child_environment(guest=True), **more}
+
+    def free(self) -> None:
+        """Another may have it, once a node that was ended here is forgotten."""
+        os.pwrite(self._file, b"used", 0)
+        os.close(self._file)
+
 
 SETTLE_S = 0.5  # from our finding the node to its finding us: what is sent before may be lost
 ANSWER_S = 1.0  # that a scan's answer is waited for, wall clock: a node may skip scans
@@ -130,12 +197,12 @@ class _Other:
         self._limits, self._first = limits, True
         domain = Domain(middleware, own=bool(command), wait_s=limits.first_s)
         link: Link | None = None
-        child: Child | None = None
+        child: Guard | None = None
         try:
             link = open_link(middleware, domain=domain.number, router=domain.router)
             self.node, self._robot = Node(link), Robot(link, paced=True)
             if command:
-                child = Child(command, domain.environment())
+                child = started(command, domain.environment())
         finally:
             self.close = weakref.finalize(self, _leave, link, child, domain)
         self._link, self._child, self._domain = link, child, domain
@@ -190,9 +257,9 @@ class _Other:
             )
 
 
-def _leave(link: Link | None, child: Child | None, domain: Domain) -> None:
+def _leave(link: Link | None, child: Guard | None, domain: Domain) -> None:
     if child is not None:
-        child.end()
+        child.dismiss()
     if link is not None:
         link.close()
     domain.free()

@@ -34,7 +34,7 @@ SHADOWED = (
 MODULE = """
 from pathlib import Path
 Path({ran!r}, "evilmod").touch()
-from scenes.arena import arena as boom
+from scenes.random_rooms import random_rooms as boom
 from slam.odometry import OdometrySlam
 class Slam(OdometrySlam):
     pass

@@ -131,7 +131,9 @@ def test_another_process_builds_the_same_bytes_whatever_it_built_before():
 
 
 def test_a_recipe_can_be_named_by_module_and_function():
-    assert scenes.build("scenes.arena:arena", 2).initial == built("arena", 2).initial
-    for entry in ("no_such_module:f", "scenes.arena:nothing", ":"):
+    assert scenes.build("scenes.random_rooms:random_rooms", 2).initial == (
+        built("random-rooms", 2).initial
+    )
+    for entry in ("no_such_module:f", "scenes.random_rooms:nothing", ":"):
         with pytest.raises(UnknownNameError):
             scenes.build(entry)

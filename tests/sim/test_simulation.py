@@ -129,7 +129,7 @@ def test_the_demo_scene_is_mapped_far_better_than_odometry():
 def test_wrong_settings_are_refused_by_name():
     with pytest.raises(UnknownNameError, match="Did you mean 'office'"):
         Simulation("ofice")
-    with pytest.raises(InvalidValueError, match="dynamism must lie in"):
+    with pytest.raises(InvalidValueError, match="dynamism must be a number from"):
         Simulation("arena", dynamism=2.0)
     with pytest.raises(InvalidValueError, match="seconds must be > 0"):
         list(tour(Simulation("arena"), -1.0))

@@ -12,6 +12,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.assembly import LIMBS
 from scenes.kinds import kind_of
 from scenes.scene import Role, Scene
 from sim.actors import holding
@@ -21,12 +22,11 @@ from sim.actors.people import columns, crowd, gait, right_of_way, trips
 from sim.actors.people.leaders import Leaders, arrays, leaders_of
 from sim.actors.people.right_of_way import Addresses, Crowd
 from sim.core.bodies import Bodies
-from sim.core.draws import between, normal, uniform
 from sim.core.flow import Field, FlowMap, nowhere
+from sim.core.seeds import between, normal, uniform
 from sim.core.state import flat
 
 Float = NDArray[np.float64]
-_LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
 FILE_FIRST, FILE_STEP = 0.95, 0.65  # m behind a leader, of the first in file and each after it
 NODE_M, LARGE_NODE_M = 0.1, 0.2  # m between the nodes of a flow map: usually, and of a large floor
 LARGE_M2 = 1e5  # m2 of floor times goals from which on a floor is large: 240 MB of nodes
@@ -94,7 +94,7 @@ class People:
         self.crowd = _crowd(bodies, doors, self.names, counters, len(at.discs))
         alive = n > 0 and math.isfinite(stay_mean) and len(scene.goals) > 0
         servos = [model.actuator(f"{p}/vx").id for p in self.names]
-        limbs = [[model.body(f"{p}/{limb}").mocapid[0] for limb in _LIMBS] for p in self.names]
+        limbs = [[model.body(f"{p}/{limb}").mocapid[0] for limb in LIMBS] for p in self.names]
         self.table = crowd.People(
             alive=alive,
             rates=self._rates,

@@ -20,8 +20,8 @@ from sim.actors.people import columns
 from sim.actors.people.following import is_pushing
 from sim.actors.people.gait import HIP, SEAT_HEIGHT
 from sim.actors.people.right_of_way import Crowd, Float, Int
-from sim.core.draws import between, uniform, waiting
 from sim.core.flow import FAR, Field, clearance_at, time_at
+from sim.core.seeds import between, uniform, waiting
 from sim.core.state import Records
 from slam._jit import inner, uncounted
 

@@ -19,6 +19,7 @@ from sim.sensors.lidar.models.lms221 import TURNS_PER_S, Lms221Config
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Frame
 from slam.frontend.odometry_steps import MotionSum
+from slam.shaped import check
 
 BITS_PER_BYTE = 10  # TL 4.1
 BYTES_PER_TURN = 508  # TL p22, at 500 kBd
@@ -41,11 +42,7 @@ class SerialLink:
     config: Lms221Config
 
     def __post_init__(self) -> None:
-        if not isinstance(self.config, Lms221Config):
-            raise InvalidValueError(
-                "SerialLink.config must be a Lms221Config: the line is that of the LMS-221, got "
-                f"{self.config!r:.80}"
-            )
+        check(self)
         if self.baud not in BAUD_RATES:
             known = ", ".join(str(rate) for rate in BAUD_RATES)
             raise InvalidValueError(f"SerialLink.baud must be one of {known}, got {self.baud!r}")

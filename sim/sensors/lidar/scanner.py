@@ -11,14 +11,16 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from fractions import Fraction
+from typing import Annotated
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
-from sim.core.checks import check_types, check_within, instance, one_of
 from sim.sensors.lidar import columns as col
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, LaserSpec
+from slam.shaped import Share, check, one_of
 
 Float = NDArray[np.float64]
 
@@ -27,6 +29,7 @@ RATE_HZ = (1.0, 300.0)  # of scans; a scan lasts a physics step of 1/300 s or lo
 MAX_BEAMS = 10_000
 MAX_TURNS = 16
 MAX_RANGE_M = 1000.0
+Metres = Annotated[float, Meta(ge=0.0, le=MAX_RANGE_M)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,14 +43,14 @@ class Spot:
     weights     (k,) their shares of the energy
     """
 
-    aperture: float = 0.0
-    divergence: float = 0.0
-    aspect: float = 1.0
+    aperture: Share = 0.0
+    divergence: Share = 0.0
+    aspect: Share = 1.0
     offsets: tuple[tuple[float, float], ...] = ((0.0, 0.0),)
     weights: tuple[float, ...] = (1.0,)
 
     def __post_init__(self) -> None:
-        check_within(self, dict.fromkeys(("aperture", "divergence", "aspect"), (0.0, 1.0)))
+        check(self)
 
     def size_at(self, range_m: float) -> tuple[float, float]:
         """Width and height of the disc, m."""
@@ -94,15 +97,12 @@ class Band:
     share    of the range
     """
 
-    up_to_m: float
-    error_m: float
-    share: float = 0.0
+    up_to_m: Annotated[float, Meta(ge=1e-3, le=MAX_RANGE_M)]
+    error_m: Share
+    share: Share = 0.0
 
     def __post_init__(self) -> None:
-        check_types(self)
-        check_within(
-            self, {"up_to_m": (1e-3, MAX_RANGE_M), "error_m": (0.0, 1.0), "share": (0.0, 1.0)}
-        )
+        check(self)
 
 
 SIGMA_AT_M = 5.0  # where a spec states the one sigma of its ranges: across a room
@@ -152,47 +152,38 @@ class Scanner:
     """
 
     name: str
-    first_deg: float
-    step_deg: float
-    n_beams: int
-    rate_hz: float
-    turns: int = 1
+    first_deg: Annotated[float, Meta(ge=-360.0, le=360.0)]
+    step_deg: Annotated[float, Meta(ge=1e-3, le=360.0)]
+    n_beams: Annotated[int, Meta(ge=1, le=MAX_BEAMS)]
+    rate_hz: Annotated[float, Meta(ge=RATE_HZ[0], le=RATE_HZ[1])]
+    turns: Annotated[int, Meta(ge=1, le=MAX_TURNS)] = 1
     clockwise: bool = False
     turn_from_deg: float | None = None
     beam_times_s: tuple[float, ...] = ()
-    range_min_m: float = 0.0
-    range_max_m: float
-    unit_m: float = 0.0
+
+    range_min_m: Metres = 0.0
+    range_max_m: Metres
+    unit_m: Share = 0.0
     noise: tuple[Band, ...] = ()
     systematic: tuple[Band, ...] = ()
-    counter_m: float = 0.0
+    counter_m: Share = 0.0
+
     spot: Spot = Spot()
     needed: tuple[tuple[float, float], ...] = ()
     incidence: bool = False
     mixed_pixels: bool = False
-    pulse_m: float = 1.0
+    pulse_m: Annotated[float, Meta(ge=0.0, le=10.0)] = 1.0
     glass: bool = False
     bounce: bool = False
     error_codes: bool = False
-    dropout_rate: float = 0.0
+    dropout_rate: Share = 0.0
 
     def __post_init__(self) -> None:
-        check_types(self)
-        instance("Scanner.spot", self.spot, Spot)
-        check_within(self, {
-            "n_beams": (1, MAX_BEAMS), "rate_hz": RATE_HZ, "turns": (1, MAX_TURNS),
-            "first_deg": (-360.0, 360.0), "step_deg": (1e-3, 360.0),
-            "range_min_m": (0.0, MAX_RANGE_M), "range_max_m": (0.0, MAX_RANGE_M),
-            "unit_m": (0.0, 1.0), "counter_m": (0.0, 1.0), "pulse_m": (0.0, 10.0),
-            "dropout_rate": (0.0, 1.0),
-        })  # fmt: skip
+        check(self)
         if not self.range_min_m < self.range_max_m:
             raise InvalidValueError(
                 f"Scanner.range_max_m must be > range_min_m, got {self.range_max_m}"
             )
-        for name in ("noise", "systematic"):
-            for band in getattr(self, name):
-                instance(f"Scanner.{name}", band, Band)
         self._check_times()
 
     def _check_times(self) -> None:

@@ -18,12 +18,11 @@ from scripts.live.view import TAKES, Network
 from sim.moments import Moment
 from sim.recording.bag import BagWriter
 from sim.simulation import Simulation
-from slam.ros.child import Domain
-from slam.ros.heard import decoded, transform_of
 from slam.ros.link import MIDDLEWARES, Taken, open_link
-from slam.ros.navigation_messages import StartMessage
-from slam.ros.node import TF
+from slam.ros.messages import StartMessage
+from slam.ros.node import TF, decoded, transform_of
 from slam.ros.serve import Served
+from slam.ros.slam import Domain
 from slam.ros.template import STORE, message, said_ns
 from slam.system import create
 from tests.scripts.live.test_session import carmen

@@ -11,9 +11,8 @@ import pytest
 
 from scripts.verbs.generate import generate
 from sim.recording.dataset import Plan, check_dataset, read_plan
-from sim.recording.days import CHANGES, FILES, THINGS
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
-from sim.recording.tables import COLUMNS, REARRANGED
+from sim.recording.tables import CHANGES, COLUMNS, FILES, REARRANGED, THINGS
 from sim.recording.verify import check_hashes, regenerate
 from slam.errors import InvalidValueError
 from slam.logs.bag_topics import Bag

@@ -8,9 +8,8 @@ import math
 import numpy as np
 import pytest
 
-from sim.core.draws import between, normal, uniform, waiting
 from sim.core.dynamism import Dynamism
-from sim.core.seeds import STREAMS, Seeds
+from sim.core.seeds import STREAMS, Seeds, between, normal, uniform, waiting
 from slam.errors import InvalidValueError, UnknownNameError
 
 

@@ -126,7 +126,7 @@ def running() -> MobiliaEnv:
         ({"options": {"gaol": (1, 2)}}, "unknown reset option 'gaol'"),
         ({"options": {"goal": (1, 2, 3)}}, "option goal must be"),
         ({"options": {"goal": (math.nan, 0)}}, "option goal must be finite"),
-        ({"options": {"dynamism": 2.0}}, "dynamism must lie in"),
+        ({"options": {"dynamism": 2.0}}, "dynamism must be a number from"),
         ({"options": {"seeds": {"chiars": 1}}}, "Did you mean 'chairs'"),
         ({"options": {"scene": {"n_chairs": -1}}}, "n_chairs"),
         ({"options": {"scene": {"dynamism": 0.1}}}, "'dynamism' is none of them"),

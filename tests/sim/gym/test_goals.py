@@ -196,7 +196,7 @@ def test_a_step_of_several_scans_ends_with_the_episode():
         ({"frame_skip": True}, "frame_skip"),
         ({"scene": "offise"}, "Did you mean 'office'"),
         ({"odometry": "pionear3dx"}, "Did you mean 'pioneer3dx'"),
-        ({"scan_height_m": 3.0}, "scan_height_m must lie in"),
+        ({"scan_height_m": 3.0}, "scan_height_m must be a number from"),
         ({"scan_height_m": "low"}, "scan_height_m must be a number"),
     ],
     ids=repr,

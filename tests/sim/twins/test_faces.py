@@ -8,7 +8,7 @@ import math
 import numpy as np
 import pytest
 
-from sim.twins.faces import laid
+from sim.twins.log import laid
 
 ANGLES = np.radians(np.arange(-60.0, 61.0))
 LASERS = np.array([[0.0, 0.1 * k, 0.0] for k in range(-5, 6)])

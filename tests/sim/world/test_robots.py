@@ -78,10 +78,10 @@ def test_a_robot_that_cannot_drive_sideways_says_so() -> None:
     ("path", "value", "said"),
     [
         (("drive", "kind"), "omni", "drive.kind must be one of"),
-        (("drive", "track_m"), -1.0, "drive.track_m must lie in"),
+        (("drive", "track_m"), -1.0, "drive.track_m must be a number from"),
         (("drive", "turn_radius_m"), 0.4, "turn_radius_m is what a car has"),
         (("footprint", "radius_m"), 0.1, "see footprint.radius_m"),
-        (("scanner", "pitch_deg"), 1.0, "scanner.pitch_deg is not known"),
+        (("scanner", "pitch_deg"), 1.0, "robot.scanner: unknown key .pitch_deg."),
     ],
 )
 def test_a_wrong_field_is_named(path: tuple[str, str], value: object, said: str) -> None:
@@ -96,5 +96,5 @@ def test_robots_by_name_or_file(tmp_path: Path) -> None:
     with pytest.raises(UnknownNameError, match="no robot is called 'husky'"):
         read_robot("husky")
     (tmp_path / "mine.toml").write_text('name = "mine"\nmass_kg = 0\n')
-    with pytest.raises(LogFormatError, match="mass_kg must lie in"):
+    with pytest.raises(LogFormatError, match="mass_kg must be a number from"):
         read_robot(str(tmp_path / "mine.toml"))

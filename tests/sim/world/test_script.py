@@ -72,7 +72,7 @@ def test_a_saved_state_knows_what_has_happened() -> None:
         ({"at_s": 1, "push": "chair0", "towards_m": [1]}, "towards_m must be"),
         ({"at_s": 1, "enter": 0, "by": "door0"}, "enter must be 1 to 20"),
         ({"at_s": 1, "enter": 2}, "by must be"),
-        ({"at_s": -1, "carry": ""}, "at_s must lie"),
+        ({"at_s": -1, "carry": ""}, "at_s must be a number from 0"),
     ],
 )
 def test_a_wrong_event_is_named_with_its_field(row: dict[str, object], field: str) -> None:

@@ -181,7 +181,7 @@ def test_a_guest_of_another_version_or_without_a_word_is_not_made():
 
 @pytest.mark.parametrize("value", [0.0, -1.0, float("nan"), float("inf"), True])
 def test_limits_are_checked(value):
-    with pytest.raises(InvalidValueError, match=r"Limits\.scan_s must be > 0 s"):
+    with pytest.raises(InvalidValueError, match=r"Limits\.scan_s must be a finite number > 0"):
         Limits(scan_s=value)
 
 

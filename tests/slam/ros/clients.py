@@ -8,8 +8,8 @@ import subprocess
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
-from slam.ros.child import Domain
 from slam.ros.link import Link, open_link
+from slam.ros.slam import Domain
 
 PREFIXES = {"dds": "ros2", "zenoh": "ros2-zenoh"}  # of SLAMs
 

@@ -19,10 +19,9 @@ from slam import se2
 from slam.errors import SlamFailedError
 from slam.frames import NS_PER_S
 from slam.ros import slam as ros2
-from slam.ros.heard import decoded, transform_of
 from slam.ros.link import open_link
 from slam.ros.messages import MAP, ODOM, TransformMessage
-from slam.ros.node import TF, Node
+from slam.ros.node import TF, Node, decoded, transform_of
 from slam.ros.robot import Robot
 from slam.ros.template import said_ns
 from slam.system import create

@@ -14,14 +14,19 @@ from slam.errors import InvalidValueError, LogFormatError, MissingDependencyErro
 from slam.estimate import Raster
 from slam.frames import NS_PER_S
 from slam.ros import slam as ros2
-from slam.ros.child import Domain
-from slam.ros.heard import StampedPose, decoded
 from slam.ros.link import Taken, Topic, open_link
-from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
-from slam.ros.navigation_messages import ClockMessage, MapMessage
-from slam.ros.node import GRID, POSES, TF, Node
+from slam.ros.messages import (
+    MAP,
+    ODOM,
+    ClockMessage,
+    IncrementMessage,
+    MapMessage,
+    TransformMessage,
+)
+from slam.ros.node import GRID, POSES, TF, Node, StampedPose, decoded
 from slam.ros.recorded import RecordedSlam, aligned
 from slam.ros.robot import Robot
+from slam.ros.slam import Domain
 from slam.ros.template import said_ns
 from slam.system import create
 from tests.slam.ros.frames import InMemory, driven

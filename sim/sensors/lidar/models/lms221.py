@@ -17,11 +17,11 @@ from __future__ import annotations
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 
-from sim.core.checks import check_types, check_within, instance, one_of
 from sim.sensors.lidar.registry import register
 from sim.sensors.lidar.scanner import ERRORS, Band, Scanner, Spot, disc
 from slam.errors import InvalidValueError
 from slam.frames import Float, LaserSpec
+from slam.shaped import Share, check, one_of
 
 TURNS_PER_S = 75
 MIRROR_FROM_DEG = -90.0  # where a turn of the mirror begins, whatever the field of view
@@ -63,11 +63,10 @@ class RangeEffects:
     systematic: bool = True
     timer: bool = True
     error_codes: bool = True
-    dropout_rate: float = 0.0
+    dropout_rate: Share = 0.0
 
     def __post_init__(self) -> None:
-        check_types(self)
-        check_within(self, {"dropout_rate": (0.0, 1.0)})
+        check(self)
 
     @classmethod
     def none(cls) -> RangeEffects:
@@ -115,13 +114,12 @@ class Lms221Config:
     resolution_deg: float = 0.5
     fov_deg: int = 180
     range_mode: str = "80m"
-    noise_std_m: float = NOISE_M
+    noise_std_m: Share = NOISE_M
     quantise: bool = True
     effects: RangeEffects = field(default_factory=RangeEffects)
 
     def __post_init__(self) -> None:
-        check_types(self)
-        instance("Lms221Config.effects", self.effects, RangeEffects)
+        check(self)
         if self.resolution_deg not in SCAN_MODES:
             raise InvalidValueError(
                 f"Lms221Config.resolution_deg must be 1, 0.5 or 0.25, got {self.resolution_deg}"
@@ -129,7 +127,6 @@ class Lms221Config:
         if self.fov_deg not in (100, 180):
             raise InvalidValueError(f"Lms221Config.fov_deg must be 100 or 180, got {self.fov_deg}")
         one_of("Lms221Config.range_mode", self.range_mode, tuple(RANGE_MODES))
-        check_within(self, {"noise_std_m": (0.0, 1.0)})
 
     @classmethod
     def ideal(

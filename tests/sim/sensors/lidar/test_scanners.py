@@ -270,7 +270,10 @@ def test_errors_can_be_named_with_any_scanner() -> None:
         ("utm30lx(fov_deg=90)", "no setting 'fov_deg'; it has none"),
         ("scanner(fov_deg=90)", "needs beams=..., rate_hz=..., sigma_m=..."),
         ("scanner(fov_deg=400, beams=10, rate_hz=10, sigma_m=0)", "fov_deg must be > 0 and at"),
-        ("scanner(fov_deg=90, beams=10, rate_hz=1000, sigma_m=0)", "rate_hz must be in 1..300"),
+        (
+            "scanner(fov_deg=90, beams=10, rate_hz=1000, sigma_m=0)",
+            "rate_hz must be a number from",
+        ),
         ("scanner(fov_deg=90, beams=1e9, rate_hz=10, sigma_m=0)", "beams must be a whole number"),
         (
             "scanner(fov_deg=90, beams=99999999, rate_hz=10, sigma_m=0)",
@@ -291,7 +294,7 @@ def test_a_scanner_that_cannot_be_is_refused() -> None:
                 range_max_m=10.0, beam_times_s=(0.0, 0.05, 0.2))  # fmt: skip
     with pytest.raises(InvalidValueError, match=r"Band\.error_m"):
         Band(up_to_m=1.0, error_m=-0.1)
-    with pytest.raises(InvalidValueError, match=r"the line is that of the LMS-221"):
+    with pytest.raises(InvalidValueError, match=r"SerialLink.config must be a Lms221Config"):
         stream("arena", seconds=1.0, laser="utm30lx", baud=38400)
 
 

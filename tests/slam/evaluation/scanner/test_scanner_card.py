@@ -12,8 +12,8 @@ import pytest
 
 from slam.errors import InvalidValueError
 from slam.evaluation.scanner.card import STATISTICS, measure
-from slam.evaluation.scanner.codes import flicker_variance, sigma_as_sent, sigma_before_rounding
 from slam.evaluation.scanner.figures import NOTHING, Figure, apart, median, ratio
+from slam.evaluation.scanner.noise import flicker_variance, sigma_as_sent, sigma_before_rounding
 from slam.evaluation.scanner.stretches import CREPT_M, LEAST_STANDING
 from slam.evaluation.scanner.walls import walls
 from slam.frames import Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata, to_ns
