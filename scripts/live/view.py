@@ -28,8 +28,8 @@ from sim.view.moment import Shown
 from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Raster
-from slam.ros.node import decoded, pose_of
 from slam.ros.link import Link, Topic
+from slam.ros.node import decoded, pose_of
 from slam.ros.robot import Robot
 
 _STRING = "std_msgs/msg/String"
