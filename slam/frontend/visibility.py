@@ -13,7 +13,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inlined, inner, njit
 from slam.frontend.polar import BEARING_OFF, bearing, bin_of
 
 MARGIN_CELLS = 1.5  # cells; a cell seen empty is before a beam's end by this; set by hand
@@ -108,7 +108,7 @@ def view_of_features(points: NDArray[np.float64], cell: float) -> View:
     return view._replace(gate=math.inf)
 
 
-@inner
+@inlined
 def _beside(view: View, turns: float, r: float) -> float:
     """How far (m) beside the nearest beam a place at range r is, so many bins round; -1: hidden."""
     bins = len(view.limit)
@@ -123,7 +123,7 @@ def _beside(view: View, turns: float, r: float) -> float:
     after = view.offset[k + 1 if k + 1 < bins else 0] + 1.0
     before = view.offset[k - 1 if k > 0 else bins - 1] - 1.0
     nearest = min(abs(off - view.offset[k]), abs(off - before), abs(off - after))
-    return nearest * view.step * r
+    return float(nearest * view.step * r)
 
 
 @inner
