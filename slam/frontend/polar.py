@@ -30,7 +30,17 @@ def bearing(x: float, y: float) -> float:
         turn = 0.5 * math.pi - turn
     if x < 0.0:
         turn = math.pi - turn
-    return -turn if y < 0.0 else turn
+    return math.copysign(turn, y)
+
+
+@inner
+def bin_of(x: float, y: float, step: float, shift: float) -> int:
+    """floor(atan2(y, x) / step + shift), by ``bearing`` where that decides it."""
+    turns = bearing(x, y) / step + shift
+    k, slack = math.floor(turns), BEARING_OFF / step
+    if slack < turns - k < 1.0 - slack:
+        return k
+    return math.floor(math.atan2(y, x) / step + shift)
 
 
 @njit

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner
+from slam.frontend.polar import bin_of
 
 NEAR_CELLS = 3.0  # cells; neighbouring hits this near are of one surface; set by hand
 LONGEST_M = 1.0  # m, longest stretch between two joined hits; set by hand
@@ -192,7 +193,7 @@ def face(
         bx, by = origin[0] - points[k, 0], origin[1] - points[k, 1]
         if nx * bx + ny * by < 0.0:
             nx, ny = -nx, -ny
-        out[k] = FACES_SEEN | (math.floor(math.atan2(ny, nx) / math.tau * FACES + 0.5) % FACES)
+        out[k] = FACES_SEEN | (bin_of(nx, ny, math.tau / FACES, 0.5) % FACES)
 
 
 @inner

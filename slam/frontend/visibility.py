@@ -13,8 +13,8 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
-from slam.frontend.polar import BEARING_OFF, bearing
+from slam._jit import inlined, inner, njit
+from slam.frontend.polar import BEARING_OFF, bearing, bin_of
 
 MARGIN_CELLS = 1.5  # cells; a cell seen empty is before a beam's end by this; set by hand
 GATE_CELLS = 0.6  # cells; a cell seen empty is this near to a beam, sideways; set by hand
@@ -108,23 +108,10 @@ def view_of_features(points: NDArray[np.float64], cell: float) -> View:
     return view._replace(gate=math.inf)
 
 
-@inner
-def seen_empty(view: View, dx: float, dy: float) -> bool:
-    """True where a beam passed by (dx, dy) (m, from the laser, laser axes) without stopping."""
-    r = math.sqrt(dx * dx + dy * dy)
-    if r >= view.farthest - view.margin:
-        return False
-    bins, slack = len(view.limit), BEARING_OFF / view.step
-    turns = bearing(dx, dy) / view.step
-    k = math.floor(turns + 0.5)
-    if abs(turns - k) < 0.5 - slack:  # in this bin, and not in its neighbour
-        if k < 0:
-            k += bins
-        elif k >= bins:
-            k -= bins
-        if r >= view.limit[k] - view.margin:
-            return False
-    turns = math.atan2(dy, dx) / view.step
+@inlined
+def _beside(view: View, turns: float, r: float) -> float:
+    """How far (m) beside the nearest beam a place at range r is, so many bins round; -1: hidden."""
+    bins = len(view.limit)
     k = math.floor(turns + 0.5)
     off = turns - k
     if k < 0:
@@ -132,11 +119,25 @@ def seen_empty(view: View, dx: float, dy: float) -> bool:
     elif k >= bins:
         k -= bins
     if r >= view.limit[k] - view.margin:
-        return False
+        return -1.0
     after = view.offset[k + 1 if k + 1 < bins else 0] + 1.0
     before = view.offset[k - 1 if k > 0 else bins - 1] - 1.0
     nearest = min(abs(off - view.offset[k]), abs(off - before), abs(off - after))
-    return bool(nearest * view.step * r <= view.gate)
+    return float(nearest * view.step * r)
+
+
+@inner
+def seen_empty(view: View, dx: float, dy: float) -> bool:
+    """True where a beam passed by (dx, dy) (m, from the laser, laser axes) without stopping."""
+    r = math.sqrt(dx * dx + dy * dy)
+    if r >= view.farthest - view.margin:
+        return False
+    turns = bearing(dx, dy) / view.step
+    if abs(turns - math.floor(turns + 0.5)) < 0.5 - BEARING_OFF / view.step:
+        beside = _beside(view, turns, r)  # in this bin, and not in its neighbour
+        if beside < 0.0 or abs(beside - view.gate) > BEARING_OFF * r:
+            return 0.0 <= beside <= view.gate
+    return 0.0 <= _beside(view, math.atan2(dy, dx) / view.step, r) <= view.gate
 
 
 @inner
@@ -148,7 +149,7 @@ def block_is_hidden(view: View, dx: float, dy: float, half: float) -> bool:
     if r <= 2.0 * half:
         return False
     bins = len(view.limit)
-    k = math.floor(math.atan2(dy, dx) / view.step + 0.5)
+    k = bin_of(dx, dy, view.step, 0.5)
     spread = int(half / r / view.step * 1.1) + 2
     if 2 * spread + 1 >= bins:
         return False

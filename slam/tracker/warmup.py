@@ -10,6 +10,7 @@ process where no folder for the cache can be written.
 from __future__ import annotations
 
 import functools
+import gc
 from collections.abc import Callable
 from typing import Any
 
@@ -46,6 +47,8 @@ def warm_up(config_class: type[TrackerConfig], new_map: Callable[[Any], CellMap]
     """
     with announced("the SLAM's kernels"):
         _run_all(config_class(cell_m=0.2), new_map)
+    gc.collect()
+    gc.freeze()  # the compiler's objects stay: looking through them again takes 100 ms of a scan
 
 
 def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:

@@ -104,7 +104,7 @@ def places(
         step = float(turns[1])
         half = math.ceil(about[2] / step)
         turns = np.asarray(np.arange(-half, half + 1) * step, dtype=np.float64)
-    depth = 2
+    depth = 3
     while (2 * reach) >> depth > MAX_ACROSS:
         depth += 1
     # Cut out, or pad, so that no point falls outside wherever the robot is tried.

@@ -74,43 +74,70 @@ class Field(NamedTuple):
     facing: NDArray[np.uint8]
 
 
+class Bell(NamedTuple):
+    """A Gaussian: covariance across rows, precision, reach, and factors from cell to cell.
+
+    ``wide`` and ``high``: how far its cells reach; ``lean``: each row's Gaussian is centred at
+    u + lean * dv, with precision ``pa``; ``falling`` from column to column, ``slowing`` from row to
+    row; ``norm`` of the density
+    """
+
+    d: float
+    pa: float
+    pb: float
+    pd: float
+    wide: float
+    high: float
+    lean: float
+    falling: float
+    slowing: float
+    norm: float
+
+
 @inner
-def _overlap(  # noqa: PLR0915 (kernel)
+def _bell(a: float, b: float, d: float, tail: float, tail_cells: float) -> Bell:
+    """Of a covariance [[a, b], [b, d]], cells^2."""
+    det = a * d - b * b
+    if det <= 0.0:  # rounding has left nothing across
+        b, det = 0.0, a * d
+    pa = d / det
+    falling = math.exp(-pa)
+    return Bell(
+        d, pa, -b / det, a / det, max(tail_cells, tail / math.sqrt(pa)),
+        max(tail_cells, tail * math.sqrt(d)), b / d, falling,
+        falling if a == d else math.exp(-1.0 / d), 1.0 / (math.pi * math.sqrt(det)),
+    )  # fmt: skip
+
+
+@inner
+def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
     field: Field,
-    reach: tuple[float, float, float, float],
+    short_term: float,
+    closed: float,
     u: float,
     v: float,
-    cov: tuple[float, float, float],
+    bell: Bell,
     faced: int,
 ) -> tuple[float, float, float, float, float, float]:
     """Overlap f of a Gaussian at (u, v) with the map, its gradient and its negative curvature.
 
-    (u, v) and ``cov`` (xx, xy, yy) are in cells, cell (i, j) lies at (i, j). f is the sum over
+    (u, v) and ``bell`` are in cells, cell (i, j) lies at (i, j). f is the sum over
     cells of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Cells
-    of a surface that faces away from the observed one (``faced``) do not count. ``reach``: weight
-    of x, the bounds of the Gaussian, and what is closed of a faint trace y: y (1 - closed (1 - y)).
+    of a surface that faces away from the observed one (``faced``) do not count. ``short_term``:
+    weight of x; ``closed`` of a faint trace y: y (1 - closed (1 - y)).
     Returns f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
     """
-    short_term, tail, tail_cells, closed = reach
-    a, b, d = cov
-    det = a * d - b * b
-    if det <= 0.0:  # rounding has left nothing across
-        b, det = 0.0, a * d
-    pa, pb, pd = d / det, -b / det, a / det
-    wide = max(tail_cells, tail / math.sqrt(pa))
-    high = max(tail_cells, tail * math.sqrt(d))
-    lean = b / d  # each row's Gaussian is centred at u + lean * dv, with precision pa,
+    d, pa, pb, pd, wide, high, lean, falling, slowing, norm = bell
     j0, j1 = math.ceil(v - high), math.floor(v + high)
-    weight = math.exp(-0.5 * (j0 - v) * (j0 - v) / d)  # and weighs exp(-dv^2 / 2 d);
-    climb, falling = math.exp(-(j0 - v + 0.5) / d), math.exp(-pa)
-    slowing = falling if a == d else math.exp(-1.0 / d)  # by recurrence: no exp in the loops
+    weight = math.exp(-0.5 * (j0 - v) * (j0 - v) / d)  # of a row: exp(-dv^2 / 2 d),
+    climb = math.exp(-(j0 - v + 0.5) / d)  # by recurrence: no exp in the loops
     i0, i1, t, first, second = 0, 0, 0.0, 0.0, 0.0
     m0 = mu = mv = muu = muv = mvv = 0.0
     rows, columns = field.directory.shape
     for j in range(j0, j1 + 1):
         dv = j - v
         shift = lean * dv
-        if j == j0 or b != 0.0:
+        if j == j0 or lean != 0.0:
             i0, i1 = math.ceil(u + shift - wide), math.floor(u + shift + wide)
             t = i0 - u - shift
             first, second = math.exp(-0.5 * pa * t * t), math.exp(-pa * (t + 0.5))
@@ -126,16 +153,15 @@ def _overlap(  # noqa: PLR0915 (kernel)
                     slot = field.directory[row, column] if 0 <= column < columns else -1
                 if slot >= 0:
                     x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
-                    value = y + (1.0 - y) * short_term * x
-                    if closed > 0.0:
-                        value -= closed * y * (1.0 - y)
-                    value *= kernel
-                    if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
-                        value = 0.0
-                    s0 += value
-                    value *= offset
-                    s1 += value
-                    s2 += value * offset
+                    if x + y > 0.0 and not opposite(faced, field.facing[slot, j & MASK, i & MASK]):
+                        value = y + (1.0 - y) * short_term * x
+                        if closed > 0.0:
+                            value -= closed * y * (1.0 - y)
+                        value *= kernel
+                        s0 += value
+                        value *= offset
+                        s1 += value
+                        s2 += value * offset
                 kernel *= ratio
                 ratio *= falling
                 offset += 1.0
@@ -150,7 +176,6 @@ def _overlap(  # noqa: PLR0915 (kernel)
             mvv += s0 * dv * dv
         weight *= climb
         climb *= slowing
-    norm = 1.0 / (math.pi * math.sqrt(det))
     return (
         norm * m0,
         norm * (pa * mu + pb * mv),
@@ -212,16 +237,19 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     scale = 1.0 / reward.cell
     field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
     c, s = math.cos(pose[2]), math.sin(pose[2])
+    # most observations have the covariance of the one before
+    alike, bell = (1.0, 0.0, 1.0), _bell(1.0, 0.0, 1.0, reward.tail, reward.tail_cells)
     for k in range(len(seen.points)):
         rx = c * seen.points[k, 0] - s * seen.points[k, 1]
         ry = s * seen.points[k, 0] + c * seen.points[k, 1]
-        cov = _turned(seen.covariances, k, c, s, scale)
+        a, b, d = _turned(seen.covariances, k, c, s, scale)
+        if a != alike[0] or b != alike[1] or d != alike[2]:
+            alike, bell = (a, b, d), _bell(a, b, d, reward.tail, reward.tail_cells)
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
         vote = seen.votes[k]
         closed = reward.young_trace * (1.0 - vote)
-        reach = reward.short_term * vote, reward.tail, reward.tail_cells, closed
         faced = turned_face(seen.facings[k], pose[2])
-        f, gx, gy, a, b, d = _overlap(field, reach, u, v, cov, faced)
+        f, gx, gy, a, b, d = _overlap(field, reward.short_term * vote, closed, u, v, bell, faced)
         if f > reward.matched_overlap:
             matched += seen.weights[k]
         else:

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
-from slam.frontend.polar import BEARING_OFF, bearing
+from slam.frontend.polar import bearing, bin_of
 
 
 class Asking(NamedTuple):
@@ -36,12 +36,11 @@ def _passed(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
     """Whether all beams within the spread went on beyond (x, y) (laser axes) by the margin."""
     end = math.sqrt(x * x + y * y) + of.margin
     bins, wide = len(limit), of.spread / of.step
-    if wide >= 1.1 and 0.1 * of.step > BEARING_OFF:  # most did not: the middle one shows it
-        k = math.floor(bearing(x, y) / of.step + 0.5)
+    if wide >= 1.1:  # most did not: the middle one shows it
+        k = bin_of(x, y, of.step, 0.5)
         if limit[k + bins if k < 0 else (k - bins if k >= bins else k)] < end:
             return False
-    turns = math.atan2(y, x) / of.step
-    first, last = math.floor(turns - wide + 0.5), math.floor(turns + wide + 0.5)
+    first, last = bin_of(x, y, of.step, 0.5 - wide), bin_of(x, y, of.step, 0.5 + wide)
     k = first % bins
     for _ in range(last + 1 - first):
         if limit[k] < end:
@@ -119,7 +118,7 @@ def _indexed(
         first[b] = last[b] = -1
     for k in range(len(points)):
         dx, dy = points[k, 0] - T_robot_laser[0], points[k, 1] - T_robot_laser[1]
-        b = math.floor(math.atan2(c * dy - s * dx, c * dx + s * dy) / step + 0.5) % bins
+        b = bin_of(c * dx + s * dy, c * dy - s * dx, step, 0.5) % bins
         if first[b] < 0:
             first[b] = k
         last[b] = k
@@ -155,7 +154,7 @@ def _left(  # noqa: PLR0913 (kernel)
             continue
         x, y = lc * u - ls * v + T_robot_laser[0], ls * u + lc * v + T_robot_laser[1]
         r = math.sqrt(u * u + v * v)
-        middle = math.floor(math.atan2(v, u) / of.step + 0.5)
+        middle = bin_of(u, v, of.step, 0.5)
         # 1.6 > pi / 2: asin(q) is below 1.6 q for q in [0, 1]
         wide = math.floor(min(near / max(r, near), 1.0) * 1.6 / of.step) + 1
         for b in range(middle - wide, middle + wide + 1):
