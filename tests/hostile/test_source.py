@@ -25,6 +25,7 @@ IMPORTERS = {
     "slam/guests/guest.py": "the two guests, by constants",
     "sim/view/camera.py": "the GL libraries, by constants",
     "scripts/workers.py": "Dask",
+    "scripts/benches/against.py": "ir-sim, by a constant",
     "scripts/cli.py": "verbs of ours, by constants",
     "scripts/option_names.py": "names to complete, by constants",
     "slam/ros/link.py": "the two middlewares, by constants",
