@@ -46,6 +46,7 @@ STARTERS = {
     "scripts/benches/cold.py": "our own Python, with an empty cache",
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/benches/shares.py": "perf and nm, on ourselves",
+    "scripts/benches/sides.py": "the Python of each of two checkouts",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/result_files.py": "git, for the commit of a results file",
 }
