@@ -39,7 +39,6 @@ BESIDE_M, BESIDE_RAD, BESIDE = (1.0, 5.0), 1.0, 2  # places beside the true one,
 PUSHES, CARRIED, FOLLOWED = 8, 6, 6  # copies that are pushed, and carried; scans after a push
 PUSH_M, PUSH_RAD = 0.3, math.radians(5.0)
 NEAR_M, NEAR_RAD = 0.1, 0.03  # a place nearby is right within both, and wrong beyond twice either
-KNOWN_M = 1.0  # of long-known surface about a true place that a search could find
 MOST_STEPS = 1000  # of a search
 Place = tuple[float, float, bool]
 """C and D, m, and whether the place is right."""
@@ -51,7 +50,7 @@ class Labelled:
 
     found    of each scan the places found for it; ``none``: of each scan of another building
     pairs    the true place of each scan, and places beside it
-    reached  of each scan whose true place the map knows: whether the search found that
+    reached  of each scan: most C of a place that a search found, and whether the true one is
     slips    places nearby: trace gained over where motion led, m, nats of the slip, and whether the
              place is right, not where motion led
     going    share of the usual match of scans at right poses; ``carried``: of carried robots
@@ -61,7 +60,7 @@ class Labelled:
     found: list[list[Place]] = field(default_factory=list)
     none: list[list[Place]] = field(default_factory=list)
     pairs: list[Place] = field(default_factory=list)
-    reached: list[bool] = field(default_factory=list)
+    reached: list[tuple[float, bool]] = field(default_factory=list)
     slips: list[tuple[float, float, bool]] = field(default_factory=list)
     going: list[float] = field(default_factory=list)
     carried: list[float] = field(default_factory=list)
@@ -135,8 +134,8 @@ class _Collector:
             if right or m >= WRONG_M or rad >= WRONG_RAD:
                 group.append((*self._evidence(observations, pose), right))
         out.found.append(group)
-        if known_m >= KNOWN_M:
-            out.reached.append(any(right for _, _, right in group))
+        best_m = max((found_m for found_m, _, _ in group), default=0.0)
+        out.reached.append((best_m, any(right for _, _, right in group)))
         others = self._observed(foreign)
         out.none.append([(*self._evidence(others, at), False) for at in self._searched(others)])
 

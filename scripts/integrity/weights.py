@@ -172,19 +172,27 @@ def nearby(slips: Sequence[tuple[float, float, bool]], start: float) -> float:
     return math.exp(float(_least(loss, np.array([start]), (1.0,))[0]))
 
 
-def _log_odds(hits: int, n: int) -> float:
-    """Of a share, half a hit and half a miss beside (Jeffreys)."""
-    return math.log((hits + 0.5) / (n - hits + 0.5))
+def searched(best_m: Float, found: NDArray[np.bool_], start: float) -> float:
+    """Log odds that a search finds the true place, a metre that the best one found confirms."""
+    if not len(best_m):
+        return start
+
+    def loss(logs: Float) -> float:
+        nats = math.exp(float(logs[0])) * best_m
+        return float(np.logaddexp(0.0, np.where(found, -nats, nats)).mean())
+
+    return math.exp(float(_least(loss, np.array([start]), (1.0,))[0]))
 
 
 def alone(many: Sequence[Labelled], start: BeliefConfig) -> Values:
     """The settings that each have labels of their own: ``ALONE``."""
-    reached = [found for one in many for found in one.reached]
+    reached = np.array([row for one in many for row in one.reached], np.float64).reshape(-1, 2)
+    most, found = np.minimum(reached[:, 0], start.linear_m), reached[:, 1] > 0.5
     going = [share for one in many for share in one.going]
     gone = sum(share < start.breaks for share in going)
     return {
         "nearby_per_m": nearby([slip for one in many for slip in one.slips], start.nearby_per_m),
-        "searched": _log_odds(sum(reached), len(reached)),
+        "searched": searched(most, found, start.searched),
         "broken": -math.log((gone + 0.5) / (len(going) + 1.0)),
     }
 

@@ -29,7 +29,6 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
-from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse, spread
 from slam.tracker.belief.posterior import Odds, probabilities
@@ -39,6 +38,7 @@ from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
 
 # Finding the start; set by hand.
+LENIENT = 10.0  # times belief.frozen_above: a start that is found must fit, too
 STEP_M = 0.02  # m, deviation of the motion between two scans
 STEP_RAD = 0.01  # rad, the same of the turn
 BUFFER = 200  # scans, kept to be merged when the place is found
@@ -289,7 +289,7 @@ class StartSearch:
         """T_map_own (3,), where one place is certain, and no other is still to be asked."""
         if self._late or not self._places.searches:
             return None
-        sure = 1.0 - LENIENT * self._belief.frozen_above  # whether it fits is asked, too
+        sure = 1.0 - LENIENT * self._belief.frozen_above
         for place, start in zip(self._places.followed, self.starts(), strict=True):
             if place.waited == 0 and start.probability >= sure:
                 return start.T_map_own if self._fits(start.T_map_own) else None

@@ -72,7 +72,7 @@ class Look(NamedTuple):
 
 
 ANEW = np.zeros((2, 0, SIDE, SIDE), np.uint8)  # nothing was counted, and nothing is kept of it
-_WHOLE = 255.0  # of a cell that is counted
+WHOLE = 255.0  # of a cell that is counted
 
 
 def uncounted(cells: Cells) -> NDArray[np.uint8]:
@@ -87,11 +87,11 @@ def fresh(  # noqa: PLR0913 (kernel)
     """What of a weight in [0, 1] was not counted before; it is now."""
     if not once:
         return weight
-    now, before = np.uint8(_WHOLE * weight + 0.5), counted[kind, slot, j, i]
+    now, before = np.uint8(WHOLE * weight + 0.5), counted[kind, slot, j, i]
     if now <= before:
         return 0.0
     counted[kind, slot, j, i] = now
-    return (float(now) - float(before)) / _WHOLE
+    return (float(now) - float(before)) / WHOLE
 
 
 def no_cells() -> Cells:

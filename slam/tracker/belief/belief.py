@@ -20,8 +20,8 @@ from slam.frames import Float
 from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
-from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.episode import Episode, second_moment
+from slam.tracker.belief.evidence import vanished
 from slam.tracker.belief.places import Place, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State, Status
@@ -32,6 +32,8 @@ from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.matching.usual import Usual
 from slam.tracker.standing.agreement import Agreement
+
+PAUSE_S = 1.0  # after a longer one, what stood may have been moved
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -76,16 +78,17 @@ class Belief:
         self._config, self._numbers = config.belief, config.tracking.relocalise
         self._matcher, self._match, self._usual = matcher, match, usual
         self._odds = Odds(config.belief, config.carried_per_h)
-        self._give_up_s = config.tracking.give_up_s
         self._episode: Episode | None = None
         self.p_lost, self.status = 0.0, Status.TRACKING
         self._p_off = 0.0  # that the robot is not where its motion led
         self._likeliest: int | None = None  # of the places that are followed, if one is
         self._since_near_s = np.inf
         self._suspect = False
+        self._latest: Observations | None = None  # the scan before, if there was one
 
     def first(self, observations: Observations) -> State:
         """The first scan: the map begins with it."""
+        self._latest = observations.with_votes(None)
         self.status = Status.TRACKING if len(observations.points_robot) else Status.BLIND
         return State.TRACKING if len(observations.points_robot) else State.BLIND
 
@@ -103,6 +106,7 @@ class Belief:
     ) -> Judged:
         """Where the robot is; ``T_map_before``: where it was at the scan before."""
         self._since_near_s += prediction.elapsed
+        before, self._latest = self._latest, observations.with_votes(None)
         if not len(observations.points_robot):
             return self._blind(cell_map, prediction)
         if self._episode is not None:
@@ -115,7 +119,10 @@ class Belief:
             match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
-        episode = self._begun(cell_map, observations, prediction, match)
+        now, gone = (self._latest, match.T_map_robot), 0.0
+        if before is not None and prediction.elapsed <= PAUSE_S:
+            gone = vanished(cell_map, (before, T_map_before), now)
+        episode = self._begun(cell_map, observations, prediction, match, gone)
         if self._p_off <= self._config.frozen_above:
             return self._settled(cell_map, match, prediction)
         self._episode, episode.matched = episode, True
@@ -138,13 +145,6 @@ class Belief:
             likeliest=self._elsewhere(episode),
         )  # fmt: skip
 
-    def _note_break(
-        self, episode: Episode, observations: Observations, prediction: Prediction, match: Match
-    ) -> None:
-        corrected, lost = self._broken(observations, prediction, match)
-        episode.broken = max(episode.broken, corrected, lost)
-        episode.break_nats = max(episode.break_nats, lost)
-
     def learn(self, observations: Observations, judged: Judged, look: Look) -> None:
         """The map took a scan in, and ``look`` is what that said of it."""
         match, elapsed = judged.match, judged.prediction.elapsed
@@ -156,13 +156,18 @@ class Belief:
         self._tell(look.through)
 
     def _broken(
-        self, observations: Observations, prediction: Prediction, match: Match
+        self,
+        observations: Observations,
+        prediction: Prediction,
+        match: Match,
+        gone: float = 0.0,
     ) -> tuple[float, float]:
         """Nats against a match as the motion: it corrects odometry, and does not go on."""
         if match.slipped or observations.weight < self._numbers.least_weight:
             return 0.0, 0.0  # paid for, or too little in view
         corrected = self._odds.corrected(prediction, match.T_map_robot)
-        return corrected, self._odds.broken(self._usual.share(match, observations))
+        share = self._usual.share(match, observations)
+        return corrected, self._odds.broken(share, gone)
 
     @staticmethod
     def _settled(cell_map: CellMap, match: Match, prediction: Prediction) -> Judged:
@@ -177,13 +182,14 @@ class Belief:
         observations: Observations,
         prediction: Prediction,
         match: Match,
+        gone: float,
     ) -> Episode:
         """What one scan says of where motion led, and of a place nearby."""
         episode = Episode(cell_map, self._matcher, self._odds, prediction.elapsed)
         episode.moved(prediction)
         episode.match = match
         episode.evidence.add(cell_map, observations, match.T_map_robot)
-        self._note_break(episode, observations, prediction, match)
+        episode.note_break(*self._broken(observations, prediction, match, gone))
         self._search_near(episode, cell_map, observations, prediction, match)
         self._weigh(episode)
         return episode
@@ -269,7 +275,7 @@ class Belief:
         if observations.weight >= self._numbers.least_weight:
             found = near(self._match(observations, prediction, episode.local), prediction)
             goes_on = self._usual.share(found, observations) >= self._config.breaks
-            self._note_break(episode, observations, prediction, found)
+            episode.note_break(*self._broken(observations, prediction, found))
             self._usual.follow(found, observations, prediction.elapsed)
             self._agreement.take(prediction, found.T_map_robot, observations.mean_vote)
             # what the map confirmed in the scan before was not all hidden
@@ -325,12 +331,11 @@ class Belief:
         prediction: Prediction,
     ) -> Judged:
         """Whether one place is certain: where motion led, or another; else wait."""
-        weighed, waited_enough = self._weighed, episode.elapsed_s > self._give_up_s
-        sure = 1.0 - self._config.frozen_above * (LENIENT if waited_enough else 1.0)
+        weighed, sure = self._weighed, 1.0 - self._config.frozen_above
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = _same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
-            taken = p >= sure and (goes_on or waited_enough)
+            taken = goes_on and p >= sure
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, observations, prediction)
         if 1.0 - self._p_off >= sure:

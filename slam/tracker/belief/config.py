@@ -8,7 +8,6 @@ from dataclasses import dataclass
 from slam.settings import Settings, number
 
 FITTED = "scripts.integrity.fit (docs/belief.md)"
-LENIENT = 10.0  # times frozen_above: enough after long waiting, or if more is asked; set by hand
 READ_OFF = "quantiles at right poses and after kidnaps, scripts.integrity.fit"
 
 
@@ -43,6 +42,10 @@ class BeliefConfig(Settings):
     breaks: float = number(
         0.3, "share", "the same: with so little it does not, and costs all of broken", READ_OFF
     )
+    vanished: float = number(
+        0.1, "share", "of what the scan before confirmed, seen through: costs all of broken",
+        READ_OFF, low=1e-6,
+    )  # fmt: skip
     pulled_m: float = number(0.2, "m", "by which movers pull a match, unlike a slip", low=1e-6)
     pulled_rad: float = number(0.1, "rad", "the same of its turn", low=1e-6)
     nearby_per_m: float = number(
@@ -53,12 +56,12 @@ class BeliefConfig(Settings):
         5.9, "nats", "a place found must explain: the best of all is better than any one", FITTED
     )
     searched: float = number(
-        4.0, "nats", "evidence of a search that is done: what it did not find is not there", FITTED
-    )
+        0.8, "nats/m", "of long-known surface that the best place confirms, up to linear_m, after "
+        "a search: what shows so much is found where it is", FITTED,
+    )  # fmt: skip
     unsearched: float = number(
         8.0, "nats", "that a place explains which a search not done may still find, after a break",
     )  # fmt: skip
-    searches: int = number(2, "searches", "most that are such evidence", low=0, high=100)
     slips_per_m: float = number(
         3e-4,
         "1/m",

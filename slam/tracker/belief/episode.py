@@ -51,7 +51,7 @@ class Episode:
     """
 
     def __init__(self, cell_map: CellMap, matcher: Matcher, odds: Odds, elapsed: float) -> None:
-        self._odds, self._cell_map = odds, cell_map
+        self._odds, self.cell_map = odds, cell_map
         self._local: CellMap | None = None
         self.evidence = Evidence()
         self.places = Places(cell_map, matcher)
@@ -66,8 +66,13 @@ class Episode:
     def local(self) -> CellMap:
         """The copy, made when it is first asked for."""
         if self._local is None:
-            self._local = self._cell_map.twin()
+            self._local = self.cell_map.twin()
         return self._local
+
+    def note_break(self, corrected: float, lost: float) -> None:
+        """Nats against a match as the motion: the most of any scan counts."""
+        self.broken = max(self.broken, corrected, lost)
+        self.break_nats = max(self.break_nats, lost)
 
     def write(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:
         """Let the copy see a scan."""
@@ -125,8 +130,8 @@ class Episode:
         """
         config = self._odds.config
         if self.places.searches:
-            searches = min(self.places.searches, config.searches)
-            return self._carried - config.searched * searches
+            found_m = max((one.evidence.known_m for one in self.places.followed), default=0.0)
+            return self._carried - config.searched * min(found_m, config.linear_m)
         share = min(self.break_nats / config.broken, 1.0)
         unknown = self._carried + config.unsearched * share
         return max(unknown, nearby) if share == 1.0 else unknown

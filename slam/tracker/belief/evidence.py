@@ -7,12 +7,16 @@ map counts once for a place, by its most: standing still, or forty looks at one 
 
 from __future__ import annotations
 
+import numpy as np
+
 from slam import se2
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import ANEW, Look, uncounted
+from slam.tracker.cells import ANEW, WHOLE, Look, uncounted
 from slam.tracker.rasterise import rasterise
+
+ENOUGH_M = 3.0  # of long-known surface: with less, a share of it says little
 
 
 class Evidence:
@@ -55,3 +59,24 @@ class Evidence:
             self._counted = uncounted(cell_map.cells)
             if before.shape[1]:
                 self._counted[:, : before.shape[1]] = before
+
+
+def vanished(
+    cell_map: CellMap, before: tuple[Observations, Float], now: tuple[Observations, Float]
+) -> float:
+    """Share of the long-known surface that a scan confirms and the next sees through, by pose.
+
+    Of what the next confirms or sees through: what is hidden from it says nothing. What stands does
+    not vanish from one scan to the next, and what moves has moved little: next to nothing at right
+    poses, and nearly all after a robot was carried elsewhere.
+    """
+    confirmed, passed = Evidence(), Evidence()
+    confirmed.add(cell_map, *before)
+    passed.add(cell_map, *now)
+    n = len(confirmed._counted[0])  # the pool of blocks may have grown since
+    there = confirmed._counted[0]
+    stays, gone = (
+        float(np.minimum(there, counted[:n]).sum(dtype=np.int64)) / WHOLE * cell_map.cell
+        for counted in passed._counted
+    )
+    return gone / (stays + gone + ENOUGH_M)

@@ -54,11 +54,15 @@ class Odds:
             return config.through_per_m * through_m
         return config.outdated + config.changed_per_m * beyond_m
 
-    def broken(self, share: float) -> float:
-        """Nats against a place where so much of the usual match goes on from the scans before."""
+    def broken(self, share: float, vanished: float = 0.0) -> float:
+        """Nats against a place where so much of the usual match goes on from the scans before, and
+        that share of what the scan before confirmed is seen through.
+        """
         config = self.config
         least, enough = config.breaks, max(config.goes_on, config.breaks + 1e-6)
-        return config.broken * min(max((enough - share) / (enough - least), 0.0), 1.0)
+        lost = min(max((enough - share) / (enough - least), 0.0), 1.0)
+        gone = vanished / config.vanished
+        return config.broken * min(lost + gone, 1.0)
 
     def corrected(self, prediction: Prediction, T_map_robot: Float) -> float:
         """Nats against a match that corrects odometry: its innovation, or a slip.

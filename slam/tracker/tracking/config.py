@@ -16,7 +16,7 @@ class TrackingConfig(Settings):
     """Following the robot, and finding it again."""
 
     give_up_s: float = number(
-        60.0, "s", "of doubt; from then on a place is certain at ten times belief.frozen_above"
+        60.0, "s", "of being lost: a session in a known map lies apart from then on"
     )
     relocalise: RelocaliseConfig = field(default=RelocaliseConfig())
 

@@ -57,6 +57,14 @@ def drawn(streams: int, scans: int) -> list[Labelled]:
     return out
 
 
+def test_what_a_search_finds_is_told_by_what_the_best_place_confirms() -> None:
+    rng = np.random.default_rng(2)
+    best_m = rng.uniform(0.0, 6.0, 4000)
+    found = rng.random(4000) < 1.0 / (1.0 + np.exp(-0.9 * best_m))
+    assert weights.searched(best_m, found, 2.0) == pytest.approx(0.9, abs=0.05)
+    assert weights.searched(best_m[:0], found[:0], 2.0) == 2.0
+
+
 @pytest.fixture(scope="module")
 def synthetic() -> list[Labelled]:
     return drawn(6, 300)

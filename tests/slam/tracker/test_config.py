@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("1637a9b2e828", "59ebbd058761")),
-        (OccupancyConfig, ["grid"], ("e733075c55fc", "b62a55d0b22e")),
+        (ShuntingConfig, [], ("4c60ccbcd994", "fb465883f12d")),
+        (OccupancyConfig, ["grid"], ("93940f5c9d43", "2306e52575b8")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

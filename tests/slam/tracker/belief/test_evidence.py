@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from slam import se2
-from slam.tracker.belief.evidence import Evidence
+from slam.tracker.belief.evidence import Evidence, vanished
 from slam.tracker.cell_map import CellMap
 from slam.tracker.rasterise import rasterise
 from tests.slam.tracker.belief.rooms import KINDS, ORIGIN, known, seen
@@ -139,3 +139,15 @@ def test_a_look_that_writes_says_what_one_that_does_not_says(kind: Kind) -> None
     assert asked.through > 0.1
     # but for cells that were never seen: a grid opens them to be written
     assert written._replace(visited=asked.visited) == asked
+
+
+def test_surface_vanishes_for_who_was_carried_not_behind_a_board_nor_for_who_drove(
+    kind: Kind,
+) -> None:
+    """The scan after is taken where the robot is, and put where it believes to be."""
+    cell_map = known(kind, FURNISHED, 60.0, ORIGIN)
+    before, ahead = (seen(FURNISHED, ORIGIN, kind), ORIGIN), np.array([0.1, 0.05, 0.1])
+    assert vanished(cell_map, before, (seen(FURNISHED, ahead, kind), ahead)) < 0.02
+    assert vanished(cell_map, before, (seen(BOARD, ORIGIN, kind), ORIGIN)) < 0.02
+    carried = np.array([-1.0, 1.2, 2.0])
+    assert vanished(cell_map, before, (seen(FURNISHED, carried, kind), ORIGIN)) > 0.2

@@ -91,6 +91,8 @@ def test_a_break_costs_nothing_where_scans_go_on_and_never_more_than_all() -> No
     assert ODDS.broken(CONFIG.goes_on) == prices[-1] == 0.0
     half = 0.5 * (CONFIG.breaks + CONFIG.goes_on)
     assert ODDS.broken(half) == pytest.approx(0.5 * CONFIG.broken)
+    assert ODDS.broken(1.0, 0.5 * CONFIG.vanished) == pytest.approx(0.5 * CONFIG.broken)
+    assert ODDS.broken(half, CONFIG.vanished) == ODDS.broken(0.0, 1.0) == CONFIG.broken
     step = Odds(replace(CONFIG, goes_on=CONFIG.breaks), 1.0)  # no division by nothing
     assert step.broken(CONFIG.breaks + 0.01) == 0.0
 
