@@ -283,7 +283,8 @@ class Belief:
             self._note_break(episode, observations, prediction, found)
             self._usual.follow(found, observations, prediction.elapsed)
             self._agreement.take(prediction, found.T_map_robot, observations.mean_vote)
-            dragged = self._is_dragged(cell_map, observations, found)
+            hidden = episode.evidence.latest_m < self._config.confirmed_m  # in the scan before
+            dragged = hidden and self._agreement.dragged(observations.mean_vote) > 0.5
             episode.matched = goes_on and not dragged
             match = found if episode.matched else replace(match, matched=found.matched)
             if dragged:
@@ -348,8 +349,7 @@ class Belief:
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
         return Judged(
             match=match, prediction=prediction, state=state, cell_map=cell_map,
-            followed=episode.matched,
-            likeliest=self._elsewhere(episode),
+            followed=episode.matched, likeliest=self._elsewhere(episode),
         )  # fmt: skip
 
     def _found(
