@@ -21,7 +21,7 @@ from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.belief.episode import Episode, second_moment
-from slam.tracker.belief.evidence import vanished
+from slam.tracker.belief.evidence import Evidence, vanished
 from slam.tracker.belief.places import Place, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State, Status
@@ -114,7 +114,7 @@ class Belief:
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
-        if self._odds.asked and self._agreement.dragged(observations.mean_vote) > 0.5:
+        if self._odds.asked and self._is_dragged(cell_map, observations, match):
             pose = self._agreement.undragged(match.T_map_robot, observations.mean_vote)
             match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
@@ -130,6 +130,16 @@ class Belief:
         episode.places.remember(observations.with_votes(None))
         episode.write(observations, match.T_map_robot, prediction.elapsed)
         return self._decided(episode, cell_map, observations, match, prediction)
+
+    def _is_dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> bool:
+        """Whether movers rather carried the match than odometry errs: by it, and what is known."""
+        dragged = self._agreement.dragged(observations.mean_vote)
+        if dragged <= 0.5:
+            return False
+        poses = match.T_map_robot, self._agreement.put_back(match.T_map_robot)
+        known = [Evidence().add(cell_map, observations, pose).known for pose in poses]
+        here, back = probabilities([self._config.nearby_per_m * known_m for known_m in known])
+        return dragged * back > (1.0 - dragged) * here
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
         """A scan without a return says nothing: odometry alone."""
@@ -278,11 +288,8 @@ class Belief:
             episode.note_break(*self._broken(observations, prediction, found))
             self._usual.follow(found, observations, prediction.elapsed)
             self._agreement.take(prediction, found.T_map_robot, observations.mean_vote)
-            # what the map confirmed in the scan before was not all hidden
-            dragged = (
-                episode.evidence.latest_m < self._config.confirmed_m
-                and self._agreement.dragged(observations.mean_vote) > 0.5
-            )
+            hidden = episode.evidence.latest_m < self._config.confirmed_m  # in the scan before
+            dragged = hidden and self._agreement.dragged(observations.mean_vote) > 0.5
             episode.matched = goes_on and not dragged
             match = found if episode.matched else replace(match, matched=found.matched)
             if dragged:
@@ -346,8 +353,7 @@ class Belief:
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
         return Judged(
             match=match, prediction=prediction, state=state, cell_map=cell_map,
-            followed=episode.matched,
-            likeliest=self._elsewhere(episode),
+            followed=episode.matched, likeliest=self._elsewhere(episode),
         )  # fmt: skip
 
     def _found(

@@ -248,3 +248,19 @@ def test_a_false_alarm_that_movers_carried_the_matches_off_changes_nothing(
     said += told(system, stream[1:])
     assert max(off_m(one, pose) for one in said) < 0.02
     assert said[-1].converged
+
+
+@pytest.mark.parametrize(("hidden", "stays"), [(False, True), (True, False)])
+def test_a_match_is_put_back_to_odometry_only_where_what_is_long_known_allows_it(
+    monkeypatch: pytest.MonkeyPatch, hidden: bool, stays: bool
+) -> None:
+    """Odometry is what is off while walls are in view; among movers that hide them it is not."""
+    system, last = mapped(ROOMS)
+    pose = at(system)
+    box = rectangle(pose[0] - 0.9, pose[1] - 0.9, pose[0] + 0.9, pose[1] + 0.9)
+    room = World2D(np.concatenate([box, arena()])) if hidden else ROOMS
+    monkeypatch.setattr(system._agreement, "dragged", lambda vote: 0.9)
+    monkeypatch.setattr(system._agreement, "put_back", lambda T: T + np.array([0.3, 0.0, 0.0]))
+    said = told(system, going_on(still(room, pose, 0.2), last)[:1])[0]
+    moved_m = float(np.hypot(*(system._T_map_robot - pose)[:2]))
+    assert (moved_m < 0.02) == stays, said.diagnostics
