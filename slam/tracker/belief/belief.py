@@ -119,7 +119,7 @@ class Belief:
             match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
-        now, gone = (self._latest, match.T_map_robot), 0.0
+        gone, now = 0.0, (self._latest, match.T_map_robot)
         if before is not None and prediction.elapsed <= PAUSE_S:
             gone = vanished(cell_map, (before, T_map_before), now)
         episode = self._begun(cell_map, observations, prediction, match, gone)
@@ -151,8 +151,7 @@ class Belief:
             episode.places.wait(prediction)
         return Judged(
             match=match, prediction=prediction, state=State.BLIND, cell_map=cell_map,
-            writes=episode is None, followed=False,
-            likeliest=self._elsewhere(episode),
+            writes=episode is None, followed=False, likeliest=self._elsewhere(episode),
         )  # fmt: skip
 
     def learn(self, observations: Observations, judged: Judged, look: Look) -> None:
@@ -181,10 +180,10 @@ class Belief:
 
     @staticmethod
     def _settled(cell_map: CellMap, match: Match, prediction: Prediction) -> Judged:
+        tracking = State.TRACKING
         return Judged(
-            match=match, prediction=prediction, state=State.TRACKING, cell_map=cell_map,
-            writes=True,
-        )  # fmt: skip
+            match=match, prediction=prediction, state=tracking, cell_map=cell_map, writes=True
+        )
 
     def _begun(
         self,

@@ -8,7 +8,7 @@ stretch of the way, searched for in a window (``search``) or started from a pred
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterable
+from collections.abc import Callable, Generator, Iterable
 
 import numpy as np
 from numpy.typing import NDArray
@@ -121,28 +121,27 @@ class Closures:
         self.spent += MATCHED + DRAWN
         return support(cell_map, seen, match), match
 
-    def search(self, middle: int, j: int, predicted: Float, gate: float) -> Edge | None:
+    def search(
+        self, middle: int, j: int, predicted: Float, gate: float
+    ) -> Generator[None, None, Edge | None]:
         """The same, searched for up to ``gate`` m around; None where two places look alike.
 
-        Where it lay online, if that explains ``alias`` times as much as the best of them.
+        Where it lay online, if that explains ``alias`` times as much as the best of them. It
+        pauses before each match.
         """
-        cell_map, seen = self._submap(middle), self._keys[j].observations
-        short_term = self._matcher.reward.short_term
-        found: list[tuple[float, Match]] = []
-        about = (predicted, gate, self._numbers.gate_rad)
+        cell_map, short_term = self._submap(middle), self._matcher.reward.short_term
         if middle not in self._fields:
             self._fields[middle] = coarse_field(cell_map, short_term)
-        field = self._fields[middle]
         self.spent += SEARCHED
-        for place in places(
-            cell_map, short_term, seen.points_robot, self._numbers.most, about, field
-        ):
-            start = self._matcher.approach(cell_map, seen, place, self._coarse)
-            match = self._matcher.climb(cell_map, seen, start, place, inverted(self._coarse))
-            found.append((support(cell_map, seen, match), match))
-            self.spent += MATCHED + DRAWN
+        points, most = self._keys[j].observations.points_robot, self._numbers.most
+        about = (predicted, gate, self._numbers.gate_rad)
+        found: list[tuple[float, Match]] = []
+        for place in places(cell_map, short_term, points, most, about, self._fields[middle]):
+            yield
+            found.append(self._matched(middle, j, place))
         if not found:
             return None
+        yield
         found.sort(key=lambda one: -one[0])
         (best, match), others = found[0], found[1:]
         known = self._matched(middle, j, self._online(middle, j))

@@ -3,7 +3,8 @@
 
 The work is done a little with each scan, in whole units (``LoopsConfig.work``), so that no scan
 takes long and one stream always gives the same result. For each key frame in turn: its step from
-those before, a search for a closure, the graph, and ties to every other passage.
+those before, a search for a closure, the graph, and ties to every other passage; searches and ties
+pause between matches.
 """
 
 from __future__ import annotations
@@ -11,7 +12,7 @@ from __future__ import annotations
 import logging
 import math
 from collections import deque
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from dataclasses import replace
 
 import numpy as np
@@ -29,7 +30,7 @@ from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.merging import LEFT, MOST_KEYS, Merge
 from slam.tracker.tracking.passages import Passages
-from slam.tracker.tracking.redraw import Correction, Redrawing, torn_pairs
+from slam.tracker.tracking.redraw import Correction, Redrawing, torn_keys
 
 RARE_S = 0.3  # s between frames in the mean, from which on each gets all work; set by hand
 _log = logging.getLogger(__name__)
@@ -59,6 +60,7 @@ class Loops(KeyFrames):
         self._edges: dict[tuple[int, int], Edge] = {}
         self.weights: dict[tuple[int, int], float] = {}  # of loops; near 0: let go of
         self._pending: list[Edge] = []  # closures that no other confirms so far
+        self._begun: Iterator[None] | None = None  # a search or tie that pauses
         self._searched = 0  # key frames that were searched for a closure
         self._ties: deque[int] = deque()  # key frames to tie to other passages
         self._tied: list[Float | None] = []  # where each was when it was tied
@@ -173,18 +175,18 @@ class Loops(KeyFrames):
         if self._relaxation is not None:
             return self._relax(self._relaxation)
         self.closures.spent = 0
+        if self._begun is not None:
+            return self._go_on(self._begun)
         if self._searched < len(self.poses):
-            self._search(self._searched)
             self._searched += 1
-            return 1 + self.closures.spent
+            return self._go_on(self._search(self._searched - 1))
         solve = self._fresh and (self._surprised or self._fresh >= self._numbers.batch)
         if solve or self._too_many():
             self._relaxed = list(self._edges)
             self._relaxation = Relaxation(np.array(self.poses), self._chain + self.edges)
             return 1
         if self._ties:
-            self._tie(self._ties.popleft())
-            return 1 + self.closures.spent
+            return self._go_on(self._tie(self._ties.popleft()))
         if len(self.poses) < len(self.keys):
             self._append(len(self.poses))
             return 1 + self.closures.spent
@@ -192,6 +194,11 @@ class Loops(KeyFrames):
             self._follow()
             return 1
         return self._look_again()
+
+    def _go_on(self, task: Iterator[None]) -> int:
+        """A task up to where it pauses or ends; the cost."""
+        self._begun = task if next(task, "ended") is None else None
+        return 1 + self.closures.spent
 
     def _append(self, j: int) -> None:
         """Chain key frame ``j`` to those before."""
@@ -205,7 +212,7 @@ class Loops(KeyFrames):
         self._chain.append(step)
         self.poses.append(se2.compose(self.poses[-1], step.T_a_b))
 
-    def _search(self, j: int) -> None:
+    def _search(self, j: int) -> Iterator[None]:
         """Close a loop at key frame ``j`` if it is on one that no tie goes on with."""
         if self._edges:
             self._ties.append(j)
@@ -218,7 +225,7 @@ class Loops(KeyFrames):
         if middle is not None:
             predicted = se2.between(self.poses[middle], self.poses[j])
             gate = self._passages.gate(j, middle)
-            edge = self.closures.search(middle, j, predicted, gate)
+            edge = yield from self.closures.search(middle, j, predicted, gate)
             if edge is not None:
                 self._rough[j] = middle, j
                 self._take(edge, predicted)
@@ -244,7 +251,7 @@ class Loops(KeyFrames):
         off_m, off_rad = math.hypot(off[0], off[1]), abs(se2.wrap(float(off[2])))
         numbers = self._numbers
         if off_m > numbers.agree_m or off_rad > numbers.agree_rad:
-            agreeing = [one for one in self._pending if self._agree(one, edge)]
+            agreeing = [one for one in self._pending if self._passages.agree(one, edge, self.poses)]
             self._pending.append(edge)
             if not agreeing:
                 return
@@ -254,17 +261,6 @@ class Loops(KeyFrames):
         self._surprised |= off_m > numbers.apply_m or off_rad > numbers.apply_rad
         self._edges[edge.a, edge.b] = edge
         self._fresh += 1
-
-    def _agree(self, one: Edge, other: Edge) -> bool:
-        """Whether two closures put the robot at the same place."""
-        if one.b == other.b or self._passages.way(one.b, other.b) > self._numbers.after_m:
-            return False
-        by_one = se2.compose(self.poses[one.a], one.T_a_b)
-        by_one = se2.compose(by_one, se2.between(self.poses[one.b], self.poses[other.b]))
-        by_other = se2.compose(self.poses[other.a], other.T_a_b)
-        off = se2.between(by_one, by_other)
-        near = math.hypot(float(off[0]), float(off[1])) < self._numbers.agree_m
-        return near and abs(float(off[2])) < self._numbers.agree_rad
 
     def _relax(self, relaxation: Relaxation) -> int:
         if not relaxation.done:
@@ -353,13 +349,10 @@ class Loops(KeyFrames):
         near, last = self._numbers.submap, max(b for _, b in held)
         near_by = [(k - near, k) for k in range(near, last)
                    if self._passages.way(k - near, k) <= self._numbers.after_m]  # fmt: skip
-        pairs = np.array(held + near_by)
-        torn = set(
-            pairs[torn_pairs(self._numbers, pairs, online, np.array(self.poses)), 1].tolist()
-        )
+        torn = torn_keys(self._numbers, held + near_by, online, np.array(self.poses))
         return len(torn) if len(torn) >= self._numbers.denying else 0
 
-    def _tie(self, j: int) -> None:
+    def _tie(self, j: int) -> Iterator[None]:
         """Tie a key frame to all passages along there."""
         first, self._tied[j] = self._tied[j] is None, self.poses[j]
         for middle in self._passages.all_near(j, self.poses):
@@ -372,6 +365,7 @@ class Loops(KeyFrames):
                 if first and j % self._numbers.every == 0:
                     self._later.append((j + 2 * self._numbers.submap, middle))
                 self._tied_to.add(j)
+            yield
         self._drop_rough(j)
 
     def _drop_rough(self, j: int) -> None:

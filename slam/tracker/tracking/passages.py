@@ -12,7 +12,9 @@ from collections.abc import Sequence
 
 import numpy as np
 
+from slam import se2
 from slam.frames import Float
+from slam.posegraph import Edge
 from slam.tracker.tracking.config import LoopsConfig
 from slam.tracker.tracking.keys import KeyFrame
 
@@ -61,3 +63,13 @@ class Passages:
             if distance < min(nearest, numbers.near_m):
                 best, nearest = middle, distance
         return best
+
+    def agree(self, one: Edge, other: Edge, poses: Sequence[Float]) -> bool:
+        """Whether two closures put the robot at the same place."""
+        if one.b == other.b or self.way(one.b, other.b) > self._numbers.after_m:
+            return False
+        by_one = se2.compose(poses[one.a], one.T_a_b)
+        by_one = se2.compose(by_one, se2.between(poses[one.b], poses[other.b]))
+        off = se2.between(by_one, se2.compose(poses[other.a], other.T_a_b))
+        near = math.hypot(float(off[0]), float(off[1])) < self._numbers.agree_m
+        return near and abs(float(off[2])) < self._numbers.agree_rad

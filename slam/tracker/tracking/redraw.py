@@ -7,7 +7,6 @@ from collections.abc import Callable
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Float
@@ -85,12 +84,12 @@ class Redrawing:
         draw(self.cell_map, key, pose, max(look, self._config.first_look_s if k == 0 else 0.0))
 
 
-def torn_pairs(
-    config: LoopsConfig, pairs: NDArray[np.int64], online: Float, graph: Float
-) -> NDArray[np.bool_]:
-    """Whether pairs (n, 2) of key frames lie otherwise in the map than in the graph."""
-    a, b = pairs[:, 0], pairs[:, 1]
+def torn_keys(
+    config: LoopsConfig, pairs: list[tuple[int, int]], online: Float, graph: Float
+) -> set[int]:
+    """The second of each pair of key frames that lies otherwise in the map than in the graph."""
+    a, b = np.array(pairs).T
     off = relative(online[a], online[b]) - relative(graph[a], graph[b])
     far = off[:, 0] ** 2 + off[:, 1] ** 2 > config.apply_m**2
     turned = np.abs(se2.wrap_array(off[:, 2])) > config.apply_rad
-    return np.asarray(far | turned)
+    return set(b[far | turned].tolist())
