@@ -127,7 +127,7 @@ class Belief:
             return self._settled(cell_map, match, prediction)
         self._episode, episode.matched = episode, True
         self._usual.follow(match, observations, prediction.elapsed)
-        episode.places.remember(observations.with_votes(None))
+        episode.places.remember(self._latest)
         episode.write(observations, match.T_map_robot, prediction.elapsed)
         return self._decided(episode, cell_map, observations, match, prediction)
 
@@ -137,8 +137,8 @@ class Belief:
         if dragged <= 0.5:
             return False
         poses = match.T_map_robot, self._agreement.put_back(match.T_map_robot)
-        known = [Evidence().add(cell_map, observations, pose).known for pose in poses]
-        here, back = probabilities([self._config.nearby_per_m * known_m for known_m in known])
+        looks = [Evidence().add(cell_map, observations, pose) for pose in poses]
+        here, back = probabilities([self._odds.evidence(look) for look in looks])
         return dragged * back > (1.0 - dragged) * here
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
@@ -218,11 +218,8 @@ class Belief:
         self._since_near_s = 0.0
         everyone = observations.with_votes(None)
         every = max(1, len(everyone.points_robot) // numbers.near_points)
-        few = replace(
-            everyone,
-            points_robot=everyone.points_robot[::every],
-            weights=everyone.weights[::every] * every,
-        )
+        points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
+        few = replace(everyone, points_robot=points, weights=weights)
         loose = inverted(spread(self._config.slip_m, self._config.slip_rad))
         window = SearchWindow(reach_m=numbers.near_m, turn_rad=numbers.near_rad)
         start = prediction.T_map_robot
