@@ -1,40 +1,44 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scan matching, Eq. (13): the pose whose observations overlap the map most, against the prior."""
+"""Scan matching, Eq. (13): the pose whose observations overlap the map most, against the prior.
+
+By what matches were like so far it is told which scans are worth a search.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import median
 
 import numpy as np
 
 from slam import se2
 from slam.frames import Float
 from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import inverted, turned
+from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.config import UsualConfig
 from slam.tracker.matching.few import Widths, blur, room_for
 from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import SCRATCH, Climb, Reward, Seen, refine
 
+LEAST = 1e-9  # shares are divided by the usual one
+
 
 def seen_by(observations: Observations) -> Seen:
-    """The arrays of ``observations``."""
+    """The arrays of ``observations``; all votes are 1 where nothing is known of them."""
     return Seen(
         observations.points_robot,
         observations.covariances,
         observations.weights,
         observations.tangents,
         observations.facings,
-        votes_of(observations),
-    )
-
-
-def votes_of(observations: Observations) -> Float:
-    """(n,) the votes of ``observations``: all 1 where nothing is known of them."""
-    votes = observations.votes
-    return np.ones(len(observations.points_robot)) if votes is None else votes
+        np.ones(len(observations.points_robot)) if observations.votes is None
+        else observations.votes,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,8 +81,60 @@ def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
     )
 
 
+class Usual:
+    """Of scans that the map took in.
+
+    matches  latest matched fractions
+    """
+
+    def __init__(self, config: UsualConfig, matches: Sequence[float] = ()) -> None:
+        self._config = config
+        self.matches: deque[float] = deque(matches, maxlen=config.remembered)
+        self._rewarded, self._overlapped = 0.0, 0.0
+
+    @property
+    def match(self) -> float:
+        """Median matched fraction."""
+        return median(self.matches) if self.matches else 1.0
+
+    def learn(self, match: Match, elapsed: float) -> None:
+        """The map took in a scan, so many s after the one before."""
+        self.matches.append(match.matched)
+        self._rewarded += self._forgotten(elapsed) * (match.rewarded - self._rewarded)
+
+    def follow(self, match: Match, observations: Observations, elapsed: float) -> None:
+        """A scan was matched, to the map or to a local copy."""
+        known = self._of_known(match, observations)
+        self._overlapped += self._forgotten(elapsed) * (known - self._overlapped)
+
+    def _forgotten(self, elapsed: float) -> float:
+        """Share of what is remembered of a second ago that a scan replaces."""
+        return min(1.0 - math.exp(-elapsed / self._config.fallen_s), 0.3)
+
+    def is_odd(self, match: Match, observations: Observations) -> bool:
+        """Whether so little is matched, or so suddenly less, that the map in view is to be asked.
+
+        Returns that have no vote and a reward that fell are the sign of a slip: who slipped sees
+        what stands at places that were empty.
+        """
+        config = self._config
+        if match.matched < config.odd * self.match:
+            return True
+        fell = match.rewarded < config.fallen * self._rewarded
+        return fell and observations.mean_vote < config.outvoted
+
+    def share(self, match: Match, observations: Observations) -> float:
+        """Of what all returns, voting or not, matched in the second before: what matches now."""
+        return self._of_known(match, observations) / max(self._overlapped, LEAST)
+
+    @staticmethod
+    def _of_known(match: Match, observations: Observations) -> float:
+        """Matched share of what the scans before had in view: nothing else can go on from them."""
+        return match.overlapped / max(observations.in_view, match.overlapped, LEAST)
+
+
 class Matcher:
-    """Matches observations to a map."""
+    """Matches observations to a map; ``usual``: what it is told of matches so far."""
 
     def __init__(self, config: TrackerConfig) -> None:
         self.config = config
@@ -96,6 +152,28 @@ class Matcher:
         steps = self.numbers.climb
         self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
         self._scratch = np.empty(SCRATCH)
+        self.usual = Usual(config.matching.usual)
+
+    def match(self, cell_map: CellMap, observations: Observations, prediction: Prediction) -> Match:
+        """Climb from the prediction; search around it when that is vague or finds too little."""
+        predicted, prior = prediction.T_map_robot, prediction.prior
+        precision = inverted(prior)
+        start = self.approach(cell_map, observations, predicted, prior)
+        match = self.climb(cell_map, observations, start, predicted, precision)
+        local = self.numbers.local
+        good = local.good_share * self.usual.match
+        vague_m = local.vague_cells * self.config.cell_m  # as far as the climb reaches
+        vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > vague_m
+        if not vague and match.matched >= good:
+            return match
+        around = Around(cell_map, self.reward.short_term)
+        for window in (SearchWindow.about(prior, local), SearchWindow.widest(local)):
+            found = self.search(cell_map, observations, predicted, precision, window, around)
+            if found.score > match.score:
+                match = found
+            if match.matched >= local.widest_share * good:
+                break
+        return match
 
     def climb(
         self,
@@ -186,7 +264,3 @@ class Matcher:
         )  # fmt: skip
         match = self.climb(cell_map, observations, start, prediction, precision)
         return replace(match, searched=True, evaluations=evaluations)
-
-    def around(self, cell_map: CellMap) -> Around:
-        """For several searches of one frame."""
-        return Around(cell_map, self.reward.short_term)
