@@ -11,19 +11,72 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slam import se2
+from slam._jit import njit
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.config import UsualConfig
-from slam.tracker.matching.few import Widths, blur, room_for
 from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import SCRATCH, Climb, Reward, Seen, refine
+
+
+class Widths(NamedTuple):
+    """Sums of two variances, m^2.
+
+    place  of the prior's position
+    least  a blur of no more is none
+    most   of the blur: it is shrunk to this
+    """
+
+    place: float
+    least: float
+    most: float
+
+
+@njit
+def blur(
+    seen: Seen, covariance: NDArray[np.float64], widths: Widths, every: int, out: Seen
+) -> bool:
+    """Fill ``out`` with one of ``every`` so many, smeared by a pose's (3, 3) ``covariance``.
+
+    That one is in the robot frame. False, and ``out`` is not to be used, where it smears none of
+    them by more than ``widths.least``.
+    """
+    xx, xy, xt = covariance[0, 0], covariance[0, 1], covariance[0, 2]
+    yy, yt, tt = covariance[1, 1], covariance[1, 2], covariance[2, 2]
+    farthest = 0.0
+    for k in range(len(seen.points)):
+        x, y = seen.points[k, 0], seen.points[k, 1]
+        farthest = max(farthest, x * x + y * y)
+    if 2.0 * (widths.place + farthest * tt) < widths.least:  # (a + b)^2 <= 2 (a^2 + b^2)
+        return False
+    blurred = False
+    for m in range(len(out.points)):
+        k = m * every
+        x, y = seen.points[k, 0], seen.points[k, 1]
+        ttx, tty = tt * x, tt * y
+        a = xx - 2.0 * xt * y + tty * y
+        b = xy + xt * x - yt * y - ttx * y
+        d = yy + 2.0 * yt * x + ttx * x
+        blurred |= a + d > widths.least
+        share = min(1.0, widths.most / max(a + d, 1e-12))
+        out.points[m, 0], out.points[m, 1] = x, y
+        out.covariances[m, 0] = seen.covariances[k, 0] + a * share
+        out.covariances[m, 1] = seen.covariances[k, 1] + b * share
+        out.covariances[m, 2] = seen.covariances[k, 2] + d * share
+        out.weights[m] = seen.weights[k] * every
+        out.tangents[m, 0], out.tangents[m, 1] = seen.tangents[k, 0], seen.tangents[k, 1]
+        out.facings[m], out.votes[m] = seen.facings[k], seen.votes[k]
+    return blurred
+
 
 LEAST = 1e-9  # shares are divided by the usual one
 
@@ -229,7 +282,11 @@ class Matcher:
             return prediction
         numbers = self.numbers.climb
         every = max(1, math.ceil(n / numbers.few))
-        few = room_for(-(-n // every))
+        m = -(-n // every)
+        few = Seen(
+            points=np.empty((m, 2)), covariances=np.empty((m, 3)), weights=np.empty(m),
+            tangents=np.empty((m, 2)), facings=np.empty(m, np.uint8), votes=np.empty(m),
+        )  # fmt: skip
         widths = Widths(
             place=float(covariance[0, 0] + covariance[1, 1]),
             least=(numbers.moved_cells * self.config.cell_m) ** 2,

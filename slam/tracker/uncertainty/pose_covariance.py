@@ -132,7 +132,10 @@ class PoseCovariance:
         self.unseen_s = (
             self.unseen_s + prediction.elapsed if self.unobservable else self.unseen_s * faded
         )
-        variance = (self._lattice + config.shared_times**2 * self.shared_m2) * self._fewer()
+        # by how much shared errors of surfaces average out less than in a whole room
+        seen = self._in_view / max(self._looks, config.forgotten)
+        fewer = max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
+        variance = (self._lattice + config.shared_times**2 * self.shared_m2) * fewer
         frames = max(1.0, config.correlated_s / max(prediction.elapsed, 1e-3))
         advance(
             self._drift,
@@ -180,12 +183,6 @@ class PoseCovariance:
         self._by_movers = turned(self._by_movers, by)
         self.along_rad = None if self.along_rad is None else self.along_rad + by
         self.covariance = self._drift + self._blind + self._shared
-
-    def _fewer(self) -> float:
-        """By how much the shared errors of surfaces average out less than in a whole room."""
-        config = self._config
-        seen = self._in_view / max(self._looks, config.forgotten)
-        return max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
 
     def _learn(self, evidence: Evidence, elapsed: float) -> None:
         keep = math.exp(-elapsed / self._config.shared_s)
