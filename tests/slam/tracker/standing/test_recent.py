@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 
 from slam.frames import NS_PER_S, Scan
 from slam.frontend.observations import Observations, from_scan
-from slam.shunting.config import ShuntingConfig
+from slam.shunting.slam import ShuntingConfig
 from slam.tracker.matching.matcher import Matcher, seen_by
 from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 from slam.tracker.standing.recent import Standing
