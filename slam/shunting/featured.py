@@ -34,9 +34,8 @@ from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.landmarks.association import ipjc
 from slam.landmarks.filter import EkfFilter
-from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.peaks import Peaks, peaks
-from slam.shunting.slam import ShuntingSlam
+from slam.shunting.slam import ShuntingConfig, ShuntingSlam
 from slam.system import Estimate, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.matcher import Match, seen_by

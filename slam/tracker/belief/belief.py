@@ -29,8 +29,7 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import Look
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.local_search import SearchWindow
-from slam.tracker.matching.matcher import Match, Matcher, near, unmatched
-from slam.tracker.matching.usual import Usual
+from slam.tracker.matching.matcher import Match, Matcher, Usual, near, unmatched
 from slam.tracker.standing.agreement import Agreement
 
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved

@@ -263,9 +263,10 @@ def test_a_false_alarm_that_movers_carried_the_matches_off_changes_nothing(
     system, last = mapped(ROOMS)
     pose = at(system)
     stream = going_on(still(ROOMS, pose, 2.0), last)
+    agreement = system._standing.agreement
     with monkeypatch.context() as patched:
-        patched.setattr(system._agreement, "dragged", lambda vote: 0.9)
-        patched.setattr(system._agreement, "undragged", lambda T, _: T + np.array([0.15, 0.0, 0.0]))
+        patched.setattr(agreement, "dragged", lambda vote: 0.9)
+        patched.setattr(agreement, "undragged", lambda T, _: T + np.array([0.15, 0.0, 0.0]))
         said = told(system, stream[:1])
     said += told(system, stream[1:])
     assert max(off_m(one, pose) for one in said) < 0.02
@@ -281,8 +282,9 @@ def test_a_match_is_put_back_to_odometry_only_where_what_is_long_known_allows_it
     pose = at(system)
     box = rectangle(pose[0] - 0.9, pose[1] - 0.9, pose[0] + 0.9, pose[1] + 0.9)
     room = World2D(np.concatenate([box, arena()])) if hidden else ROOMS
-    monkeypatch.setattr(system._agreement, "dragged", lambda vote: 0.9)
-    monkeypatch.setattr(system._agreement, "put_back", lambda T: T + np.array([0.3, 0.0, 0.0]))
+    agreement = system._standing.agreement
+    monkeypatch.setattr(agreement, "dragged", lambda vote: 0.9)
+    monkeypatch.setattr(agreement, "put_back", lambda T: T + np.array([0.3, 0.0, 0.0]))
     said = told(system, going_on(still(room, pose, 0.2), last)[:1])[0]
     moved_m = float(np.hypot(*(system._T_map_robot - pose)[:2]))
     assert (moved_m < 0.02) == stays, said.diagnostics
