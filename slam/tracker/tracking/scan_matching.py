@@ -4,10 +4,13 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
+from slam.tracker.belief.places import spread
+from slam.tracker.belief.posterior import Odds
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.local_search import SearchWindow
@@ -20,27 +23,36 @@ class ScanMatching:
 
     def __init__(self, config: TrackerConfig, matcher: Matcher, usual: Usual) -> None:
         self._config, self._matcher, self._usual = config, matcher, usual
+        self._odds = Odds(config.belief, config.carried_per_h)
 
     def match(self, cell_map: CellMap, observations: Observations, prediction: Prediction) -> Match:
-        """Climb from the prediction; search around it when that is vague or finds too little."""
+        """Climb from the prediction; search around it when that is vague or finds too little.
+
+        Where too little is found, wheels may have slipped: it is searched as after a slip, and what
+        that finds has to be better by the price of a slip.
+        """
         predicted, prior = prediction.T_map_robot, prediction.prior
         precision = inverted(prior)
         start = self._matcher.approach(cell_map, observations, predicted, prior)
         match = self._matcher.climb(cell_map, observations, start, predicted, precision)
-        numbers = self._config.matching.local
+        numbers, belief = self._config.matching.local, self._config.belief
+        good, vague = numbers.good_share * self._usual.match, self._is_vague(prior)
+        if match.matched >= good and not vague:
+            return match
         near, widest = SearchWindow.about(prior, numbers), SearchWindow.widest(numbers)
-        good = numbers.good_share * self._usual.match
-        poor = numbers.widest_share * good
+        slip = inverted(prior + spread(belief.slip_m, belief.slip_rad))
+        slipped = self._odds.slipped(math.hypot(*prediction.increment[:2].tolist()), 0.0, 0.0)
         around = self._matcher.around(cell_map)
-        wanted = self._is_vague(prior) or match.matched < good
-        for window, search in ((near, wanted), (widest, True)):
-            if not search or (window is widest and match.matched >= poor):
-                break
-            found = self._matcher.search(
-                cell_map, observations, predicted, precision, window, around
-            )
-            if found.score > match.score:
-                match = found
+        for window, about, nats, enough in (
+            (near, precision, 0.0, math.inf if vague else 0.0),
+            (near, slip, slipped, good),
+            (widest, precision, 0.0, numbers.widest_share * good),
+        ):
+            if match.matched >= enough:
+                continue
+            found = self._matcher.search(cell_map, observations, predicted, about, window, around)
+            if found.score + nats > match.score:
+                match = replace(found, score=found.score + nats)
         return match
 
     def _is_vague(self, prior: Float) -> bool:
