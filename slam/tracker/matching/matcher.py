@@ -96,6 +96,7 @@ class Matcher:
         steps = self.numbers.climb
         self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
         self._scratch = np.empty(SCRATCH)
+        self._around = Around(self.reward.short_term)
 
     def climb(
         self,
@@ -181,12 +182,12 @@ class Matcher:
         ``around``: what searches of the same frame laid out before.
         """
         start, evaluations = search(
-            cell_map, self.reward.short_term, observations, prediction, precision,
-            window, self.config.reward, around,
+            cell_map, around or self.around(cell_map), observations, prediction, precision,
+            window, self.config.reward,
         )  # fmt: skip
         match = self.climb(cell_map, observations, start, prediction, precision)
         return replace(match, searched=True, evaluations=evaluations)
 
     def around(self, cell_map: CellMap) -> Around:
-        """For several searches of one frame."""
-        return Around(cell_map, self.reward.short_term)
+        """For several searches of one frame in one map; the next call takes its room."""
+        return self._around.of(cell_map)

@@ -79,6 +79,7 @@ class Loops(KeyFrames):
         self._new_graph = False
         self._weighed = False  # the loops were, and nobody asked what follows
         self._moved = False  # the map was corrected
+        self._owed = 0  # units spent before the next work
 
     def hold(self) -> None:
         """The map is not moved from now on."""
@@ -90,11 +91,12 @@ class Loops(KeyFrames):
         return [*self._edges.values()]
 
     def work(self) -> None:
-        """Up to ``LoopsConfig.work`` units, fewer where frames come often; tasks are ended."""
+        """Up to ``LoopsConfig.work`` units and a piece, fewer where frames come often."""
         if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
         share = self.keys[-1].start_s / self.keys[-1].frame / RARE_S
-        spent, most = 0, self._numbers.work * min(max(share, 1.0 / 3.0), 1.0)
+        spent, most = self._owed, self._numbers.work * min(max(share, 1.0 / 3.0), 1.0)
+        self._owed = 0
         while spent < most:
             cost = self._task()
             if cost == 0:
@@ -123,7 +125,7 @@ class Loops(KeyFrames):
         """
         if not self._weighed or self.keys[-1].frame != frame:
             return None
-        self._weighed = False
+        self._weighed, self._owed = False, self._cost(48)
         held = {
             pair: edge
             for pair, edge in self._edges.items()
@@ -184,7 +186,7 @@ class Loops(KeyFrames):
         if solve or self._too_many():
             self._relaxed = list(self._edges)
             self._relaxation = Relaxation(np.array(self.poses), self._chain + self.edges)
-            return 1
+            return self._cost(96)
         if self._ties:
             return self._go_on(self._tie(self._ties.popleft()))
         if len(self.poses) < len(self.keys):
@@ -192,13 +194,17 @@ class Loops(KeyFrames):
             return 1 + self.closures.spent
         if self._new_graph:
             self._follow()
-            return 1
+            return self._cost(256)
         return self._look_again()
 
     def _go_on(self, task: Iterator[None]) -> int:
         """A task up to where it pauses or ends; the cost."""
         self._begun = task if next(task, "ended") is None else None
         return 1 + self.closures.spent
+
+    def _cost(self, edges: int) -> int:
+        """Units of work with all edges of the graph: one for so many of them."""
+        return 1 + (len(self._chain) + len(self._edges)) // edges
 
     def _append(self, j: int) -> None:
         """Chain key frame ``j`` to those before."""
@@ -265,7 +271,7 @@ class Loops(KeyFrames):
     def _relax(self, relaxation: Relaxation) -> int:
         if not relaxation.done:
             relaxation.round()
-            return 1 + len(self.poses) // 64
+            return self._cost(128)
         weights = relaxation.weights[len(self._chain) :].tolist()
         self.weights = dict(zip(self._relaxed, weights, strict=True))
         self.poses = list(relaxation.poses)
@@ -357,7 +363,7 @@ class Loops(KeyFrames):
         first, self._tied[j] = self._tied[j] is None, self.poses[j]
         for middle in self._passages.all_near(j, self.poses):
             predicted = se2.between(self.poses[middle], self.poses[j])
-            edge = self.closures.tie(middle, j, predicted)
+            edge = yield from self.closures.tie(middle, j, predicted)
             if edge is not None:
                 if self._rough.get(j) == (middle, j):
                     del self._rough[j]
