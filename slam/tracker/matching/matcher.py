@@ -217,6 +217,7 @@ class Matcher:
         self._scratch = np.empty(SCRATCH)
         self.usual = Usual(config.matching.usual)
         self._odds = Odds(config.belief, config.carried_per_h)
+        self._around = Around(self.reward.short_term)
 
     def match(self, cell_map: CellMap, observations: Observations, prediction: Prediction) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little.
@@ -237,7 +238,7 @@ class Matcher:
         near, widest = SearchWindow.about(prior, local), SearchWindow.widest(local)
         slip = inverted(prior + np.diag([belief.slip_m**2, belief.slip_m**2, belief.slip_rad**2]))
         slipped = self._odds.slipped(math.hypot(*prediction.increment[:2].tolist()), 0.0, 0.0)
-        around = Around(cell_map, self.reward.short_term)
+        around = self._around.of(cell_map)
         for window, about, nats, enough in (
             (near, precision, 0.0, math.inf if vague else 0.0),
             (near, slip, slipped, good),
@@ -338,8 +339,8 @@ class Matcher:
         ``around``: what searches of the same frame laid out before.
         """
         start, evaluations = search(
-            cell_map, self.reward.short_term, observations, prediction, precision,
-            window, self.config.reward, around,
+            cell_map, around or self._around.of(cell_map), observations, prediction, precision,
+            window, self.config.reward,
         )  # fmt: skip
         match = self.climb(cell_map, observations, start, prediction, precision)
         return replace(match, searched=True, evaluations=evaluations)
