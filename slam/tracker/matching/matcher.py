@@ -19,6 +19,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam._jit import njit
 from slam.frames import Float
+from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.tracker.cell_map import CellMap
@@ -132,6 +133,14 @@ def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
         tau=0.0,
         overlapped=matched,
     )
+
+
+def near(match: Match, prediction: Prediction) -> Match:
+    """The match, or odometry alone where rounding has carried it past all places and numbers."""
+    off = np.abs(match.T_map_robot - prediction.T_map_robot)
+    if off.max() <= odometry_steps.MOST_STEP_M and np.isfinite(match.information).all():
+        return match
+    return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
 
 
 class Usual:
