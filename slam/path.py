@@ -9,6 +9,7 @@ import numpy as np
 
 from slam import se2
 from slam.errors import InvalidValueError
+from slam.estimate import Raster
 from slam.frames import Float
 from slam.trajectory import Trajectory
 
@@ -73,3 +74,17 @@ class PosePath:
             stamps_ns=np.array(self._stamps, dtype=np.int64),
             poses=self.poses() if poses is None else poses,
         )
+
+
+class OnPath:
+    """A SLAM without a map that keeps its online poses in ``_path``, which its ``reset`` makes."""
+
+    _path: PosePath
+
+    def map(self) -> Raster | None:
+        """None: there is none, or it is the SLAM's own affair."""
+        return None
+
+    def trajectory(self) -> Trajectory:
+        """The online poses."""
+        return self._path.trajectory()

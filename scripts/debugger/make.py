@@ -52,7 +52,9 @@ def blame_picture(path: Path, found: Inquest) -> None:
     """Write it."""
     seconds, rows = _moments(found)
     strips = [("as it was", found.tape.strip, rows, Change())]
-    shown = _shown(found)
+    # the re-run beside the original: the best cure, else everybody out
+    able = [trial for trial in found.trials if not trial.failed]
+    shown = next(iter(found.named or found.cures or found.together or able), None)
     if shown is not None:
         later = [row - found.first for row in rows]
         strips.append((who(shown), shown.strip, later, shown.change))
@@ -74,12 +76,6 @@ def blame_picture(path: Path, found: Inquest) -> None:
     handles, known = chart.get_legend_handles_labels()
     figure.legend(handles, known, loc="outside lower left", ncols=4, frameon=False, fontsize=8)
     save(figure, path)
-
-
-def _shown(found: Inquest) -> Trial | None:
-    """The re-run beside the original: the best cure, else everybody out."""
-    able = [trial for trial in found.trials if not trial.failed]
-    return next(iter(found.named or found.cures or found.together or able), None)
 
 
 def _moments(found: Inquest) -> tuple[list[float], list[int]]:
