@@ -362,7 +362,6 @@ class Belief:
             )  # fmt: skip
         return Judged(
             match=place.match, prediction=prediction, state=State.RELOCATED, cell_map=cell_map,
-            writes=True,
         )  # fmt: skip
 
     def spread_about(self, T_map_robot: Float, anywhere: Callable[[Float], Float]) -> Float:

@@ -90,7 +90,7 @@ class Episode:
     def prior(self, place: Match, here: Float) -> float:
         """Nats of a slip from ``here`` to that place."""
         x, y, turn = (place.T_map_robot - here).tolist()
-        return self._odds.slipped(self.way_m, math.hypot(x, y), se2.wrap(turn))
+        return self._odds.config.slipped(self.way_m, math.hypot(x, y), se2.wrap(turn))
 
     def weight(self, place: Place) -> float:
         """Nats of having been carried to a place, or of having slipped there."""

@@ -22,7 +22,6 @@ from slam.frames import Float
 from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
-from slam.tracker.belief.posterior import Odds
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.config import UsualConfig
@@ -216,7 +215,6 @@ class Matcher:
         self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
         self._scratch = np.empty(SCRATCH)
         self.usual = Usual(config.matching.usual)
-        self._odds = Odds(config.belief, config.carried_per_h)
         self._around = Around(self.reward.short_term)
 
     def match(self, cell_map: CellMap, observations: Observations, prediction: Prediction) -> Match:
@@ -237,17 +235,18 @@ class Matcher:
             return match
         near, widest = SearchWindow.about(prior, local), SearchWindow.widest(local)
         slip = inverted(prior + np.diag([belief.slip_m**2, belief.slip_m**2, belief.slip_rad**2]))
-        slipped = self._odds.slipped(math.hypot(*prediction.increment[:2].tolist()), 0.0, 0.0)
+        slipped = belief.slipped(math.hypot(*prediction.increment[:2].tolist()))
         around = self._around.of(cell_map)
-        for window, about, nats, enough in (
-            (near, precision, 0.0, math.inf if vague else 0.0),
-            (near, slip, slipped, good),
-            (widest, precision, 0.0, local.widest_share * good),
+        poor = local.widest_share * good
+        for window, about, nats, least, enough in (
+            (near, precision, 0.0, 0.0, math.inf),
+            (near, slip, slipped, poor, good),
+            (widest, precision, 0.0, 0.0, poor),
         ):
             if match.matched >= enough:
                 continue
             found = self.search(cell_map, observations, predicted, about, window, around)
-            if found.score + nats > match.score:
+            if found.score + nats > match.score and found.matched >= least:
                 match = replace(found, score=found.score + nats)
         return match
 
