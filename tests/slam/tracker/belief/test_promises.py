@@ -37,7 +37,7 @@ from tests.slam.tracker.belief.drives import (
     still,
     told,
 )
-from tests.world2d import Drive, World2D, arena, frames, going_on, rectangle
+from tests.world2d import Drive, World2D, arena, frames, going_on, laser, rectangle
 
 ELSEWHERE = Drive((-2.6, 1.5, 2.2), ((0.0, 0.3, 16.0),))
 OTHER_PLACES = [(2.0, -2.0, 2.0), (-2.6, 1.5, 2.2), (3.0, 2.5, -1.0), (-3.5, -2.8, 0.4)]
@@ -152,6 +152,28 @@ def test_a_robot_carried_to_one_of_two_places_alike_does_not_guess() -> None:
     said = told(system, after)
     assert "relocated" not in states(said)
     assert not any(one.converged for one in said)
+
+
+@pytest.mark.parametrize(("give_up_s", "found"), [(4.0, True), (1000.0, False)])
+def test_who_leaves_the_map_in_doubt_is_believed_after_a_while(
+    give_up_s: float, found: bool
+) -> None:
+    """Not sooner: what stands on the map in view may still tell."""
+    parts = (-5.0, -2.0, 60.0, 2.0), (-3.0, 1.0, -2.2, 1.6), (2.0, -1.8, 3.2, -1.2)
+    hall = World2D(np.vstack([rectangle(*part) for part in (*parts, (5.0, 1.2, 5.6, 2.0))]))
+    short = laser(181, range_max=8.0)  # m; the map ends there
+    numbers = {"belief.frozen_above": 0.005, "tracking.give_up_s": give_up_s}
+    system = ShuntingSlam(FAST.changed(numbers))
+    stream = frames(hall, TURN, rate_hz=5.0, seed=3, spec=short)
+    told(system, stream)
+    drive = Drive((2.0, 0.5, 1.0), ((0.0, 0.4, 1.0), (0.0, -1.4, 1.0), (1.5, 0.0, 8.0)))
+    after = going_on(frames(hall, drive, rate_hz=5.0, seed=7, spec=short), stream[-1])
+    for frame in after:
+        estimate = system.update(frame.without_truth())
+        assert not estimate.converged or off_m(estimate, frame.truth) < 0.2
+        assert frame.truth is not None
+        assert frame.truth[0] > 6.0 or not estimate.converged  # walls of the map are in view
+    assert estimate.converged == found
 
 
 def test_a_robot_carried_to_where_all_in_view_hides_the_map_knows_it() -> None:
