@@ -113,6 +113,11 @@ def no_cells() -> Cells:
     )
 
 
+def used(cells: Cells) -> int:
+    """Blocks that live."""
+    return len(cells.free) - int(cells.counts[FREE_COUNT])
+
+
 def with_room(old: Cells) -> Cells:
     """More of what ran out: slots in the pool, or scratch for impressions.
 

@@ -22,8 +22,11 @@ from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places
 from slam.tracker.belief.posterior import MOST_NATS, Odds, probabilities
 from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import used
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
+
+MOST_NEW = 2000  # blocks, set by hand: all of the station has 8000, at cells of 3 cm
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -75,7 +78,9 @@ class Episode:
         self.break_nats = max(self.break_nats, lost)
 
     def write(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:
-        """Let the copy see a scan."""
+        """Let the copy see a scan; grown by ``MOST_NEW`` blocks, it is begun anew."""
+        if used(self.local.cells) > used(self.cell_map.cells) + MOST_NEW:
+            self._local = self.cell_map.twin()
         rasterise(self.local, observations, T_map_robot)
         T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
         step = min(elapsed, self.local.config.map.longest_look_s)

@@ -16,6 +16,7 @@ from slam.frontend.observations import observe
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.episode import Episode
 from slam.tracker.belief.posterior import Odds
+from slam.tracker.cells import used
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.tracker import Tracker
 from tests.slam.tracker.belief.drives import (
@@ -256,6 +257,21 @@ def test_what_the_local_copy_sees_is_not_in_the_map(kind: type[Tracker]) -> None
     for one, other in zip(before, system.cell_map.cells, strict=True):
         np.testing.assert_array_equal(one, other)
     assert not np.array_equal(episode.local.cells.y, system.cell_map.cells.y)
+
+
+def test_the_local_copy_grows_no_further_than_by_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
+    """Who is lost for hours drives through more than is ever matched again."""
+    monkeypatch.setattr("slam.tracker.belief.episode.MOST_NEW", 40)
+    system, last = mapped(ROOMS)
+    odds = Odds(system.config.belief, system.config.carried_per_h)
+    lost = Episode(system.cell_map, Matcher(system.config), odds, 0.2)
+    frame = going_on(still(ROOMS, at(system), 0.2), last)[0]
+    seen, known, grown = observe(frame, np.zeros(3), system.config), used(system.cell_map.cells), []
+    for k in range(20):
+        lost.write(seen, np.array([20.0 * (k + 1), 0.0, 0.0]), 0.2)
+        grown.append(used(lost.local.cells) - known)
+    assert 40 < max(grown) <= 40 + 2 * grown[0]
+    assert used(system.cell_map.cells) == known
 
 
 def test_wheels_that_slip_while_boards_hide_most_do_not_turn_the_robot() -> None:
