@@ -6,7 +6,6 @@ A plan with another mark, or with too few words in one, is refused: it would be 
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -15,7 +14,7 @@ from typing import TYPE_CHECKING
 import mujoco
 
 from scenes.kinds import KINDS
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, meant
 
 if TYPE_CHECKING:
     from scenes.scene import Pose
@@ -93,8 +92,7 @@ def check_marks(source: str, found: Sequence[Mark], parts: Collection[str]) -> N
     for first, mark in seen.items():
         if first in WRITTEN or first in parts:
             continue
-        near = difflib.get_close_matches(first, [*WRITTEN, *parts], n=1)
-        hint = f" Did you mean '{near[0]}'?" if near else ""
+        hint = meant(first, [*WRITTEN, *parts])
         raise InvalidValueError(
             f"plan '{source}': unknown mark '{':'.join(mark.words)}'.{hint} Marks: "
             f"{', '.join(WRITTEN.values())}; or furniture: {', '.join(sorted(parts))}"

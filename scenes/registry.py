@@ -3,7 +3,6 @@
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import inspect
 from collections.abc import Callable
@@ -13,7 +12,7 @@ from typing import TYPE_CHECKING, Any, TypeVar
 from scenes import SCAN_HEIGHT, is_file
 from scenes.ours import ROWS, recipe
 from slam.bounded import check_file
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.errors import InvalidValueError, UnknownNameError, meant
 from slam.names import first_line, join_folders, refuse_code
 
 if TYPE_CHECKING:  # both load MuJoCo, and names are checked before that
@@ -105,10 +104,8 @@ def check_name(name: str) -> None:
         return
     if ":" in name or name in OWN or name in _recipes:
         return
-    near = difflib.get_close_matches(name, names(), n=1)
-    hint = f" Did you mean '{near[0]}'?" if near else ""
     raise UnknownNameError(
-        f"no scene is called '{name}'.{hint} Known: {', '.join(names())}, "
+        f"no scene is called '{name}'.{meant(name, names())} Known: {', '.join(names())}, "
         "module:function, or a file (.toml, .xml)."
     )
 

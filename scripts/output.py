@@ -16,7 +16,7 @@ from scripts.machine import versions
 from sim.core.versions import WORLD
 from sim.recording.sums import check_vouched, write_sums
 from slam import files, locks
-from slam.bounded import check_file
+from slam.bounded import json_of
 from slam.errors import LogFormatError, OutputError
 from slam.names import NameFromFile
 from slam.system import config_of
@@ -265,20 +265,8 @@ def _plain(value: Any) -> Any:
 
 def read_recipe_words(path: Path) -> dict[str, Any]:
     """The object in a ``recipe.json`` of whatever command; ``LogFormatError`` for anything else."""
-    check_file(path)
-    try:
-        with path.open("rb") as file:
-            raw = file.read(MAX_RECIPE_BYTES + 1)
-        if len(raw) > MAX_RECIPE_BYTES:
-            raise LogFormatError(path, f"more than {MAX_RECIPE_BYTES} bytes: no recipe")
-        check_vouched(path)
-        words = json.loads(raw.decode("utf-8"))
-    except OSError as error:
-        raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
-    except (ValueError, RecursionError) as error:
-        raise LogFormatError(path, f"no recipe: {error}") from error
-    if not isinstance(words, dict):
-        raise LogFormatError(path, "no recipe: not a JSON object")
+    words = json_of(path, MAX_RECIPE_BYTES, "recipe", strict=False)
+    check_vouched(path)
     return words
 
 

@@ -6,11 +6,11 @@ from __future__ import annotations
 import json
 import math
 import subprocess
-from collections.abc import Callable, Mapping
+from collections.abc import Mapping
 from pathlib import Path
 from typing import Any
 
-from slam.bounded import text_of
+from slam.bounded import json_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import write_text
 
@@ -78,17 +78,15 @@ def load(
     path: Path,
     what: str = "results file",
     schema: int | None = SCHEMA,
-    constant: Callable[[str], Any] | None = None,
+    *,
+    strict: bool = False,
 ) -> dict[str, Any]:
     """The object in a JSON file; ``LogFormatError`` for what is no ``what`` of this schema.
 
-    schema    None: it has none
-    constant  called with Infinity and NaN
+    schema  None: it has none
+    strict  without Infinity and NaN
     """
-    try:
-        data = json.loads(text_of(path, MAX_BYTES), parse_constant=constant)
-    except (ValueError, RecursionError) as error:
-        raise LogFormatError(path, f"no {what}: {error}") from error
-    if not isinstance(data, dict) or (schema is not None and data.get("schema") != schema):
-        raise LogFormatError(path, f"no {what}" + (f" of schema {schema}" if schema else ""))
+    data = json_of(path, MAX_BYTES, what, strict=strict)
+    if schema is not None and data.get("schema") != schema:
+        raise LogFormatError(path, f"no {what} of schema {schema}")
     return data

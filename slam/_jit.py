@@ -24,13 +24,11 @@ from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
 
 # isort: off
-from slam import _numba  # noqa: F401  (before anything else imports Numba)
+from slam._numba import link_once  # before anything else imports Numba
 
 # isort: on
 import numba
 from numba.core import event
-
-from slam._linking import link_once
 
 _log = logging.getLogger(__name__)
 _cache_is_writable = True

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import json
 import stat
 import tomllib
 from pathlib import Path
@@ -47,3 +48,21 @@ def toml_of(path: Path, most: int) -> dict[str, Any]:
         return tomllib.loads(text_of(path, most))
     except (tomllib.TOMLDecodeError, RecursionError) as error:
         raise LogFormatError(path, f"is no TOML: {error}") from error
+
+
+def json_of(path: Path, most: int, what: str, *, strict: bool = True) -> dict[str, Any]:
+    """The object of a JSON file; ``LogFormatError`` for what is no ``what``.
+
+    strict  Infinity and NaN, which are no JSON, are refused
+    """
+
+    def refuse(constant: str) -> None:
+        raise ValueError(f"{constant} is no JSON number")
+
+    try:
+        data = json.loads(text_of(path, most), parse_constant=refuse if strict else None)
+    except (ValueError, RecursionError) as error:
+        raise LogFormatError(path, f"no {what}: {error}") from error
+    if not isinstance(data, dict):
+        raise LogFormatError(path, f"no {what}: not a JSON object")
+    return data

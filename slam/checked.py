@@ -78,11 +78,6 @@ def pose(owner: str, name: str, value: ArrayLike) -> Float:
     return array
 
 
-def _close(a: float, b: float) -> bool:
-    """Equal but for rounding."""
-    return abs(a - b) <= 1e-9 + 1e-6 * min(abs(a), abs(b))
-
-
 def possible(
     xx: float, xy: float, yy: float, xt: float = 0.0, yt: float = 0.0, tt: float = 0.0
 ) -> bool:
@@ -101,15 +96,14 @@ def covariance(owner: str, name: str, value: ArrayLike) -> Float:
     array = frozen(owner, name, value, (3, 3))
     finite(owner, name, array)
     rows = array.tolist()  # scalars: np.allclose on nine numbers costs more than a whole motion
-    if min(rows[0][0], rows[1][1], rows[2][2]) < 0.0 or not (
-        _close(rows[0][1], rows[1][0])
-        and _close(rows[0][2], rows[2][0])
-        and _close(rows[1][2], rows[2][1])
-    ):
+    (xx, xy, xt), (yx, yy, yt), (tx, ty, tt) = rows
+    equal = all(
+        abs(a - b) <= 1e-9 + 1e-6 * min(abs(a), abs(b)) for a, b in ((xy, yx), (xt, tx), (yt, ty))
+    )  # but for rounding
+    if min(xx, yy, tt) < 0.0 or not equal:
         raise InvalidValueError(
             f"{owner}.{name} must be symmetric with variances >= 0, got {array.tolist()}"
         )
-    (xx, xy, xt), (_, yy, yt), (_, _, tt) = rows
     if not possible(xx, xy, yy, xt, yt, tt):
         raise InvalidValueError(
             f"{owner}.{name} must be positive semidefinite (no correlations beyond 1), "

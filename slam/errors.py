@@ -7,6 +7,8 @@ characters, whatever a guest or a file says in it.
 
 from __future__ import annotations
 
+import difflib
+from collections.abc import Iterable
 from pathlib import Path
 
 
@@ -19,6 +21,12 @@ def printable(words: str) -> str:
     if words.isprintable():
         return words
     return "".join(c if c.isprintable() else ascii(c)[1:-1] for c in words)
+
+
+def meant(name: str, known: Iterable[str], cutoff: float = 0.6) -> str:
+    """`` Did you mean 'office'?`` for the known name that is nearest; "" where none is near."""
+    near = difflib.get_close_matches(name, list(known), n=1, cutoff=cutoff)
+    return f" Did you mean '{near[0]}'?" if near else ""
 
 
 class MobiliaError(Exception):

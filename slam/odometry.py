@@ -8,13 +8,12 @@ import numpy as np
 from slam import se2
 from slam.frames import Float, Frame, Odometry
 from slam.frontend import odometry_steps
-from slam.path import PosePath
-from slam.system import Estimate, Raster, register
-from slam.trajectory import Trajectory
+from slam.path import OnPath, PosePath
+from slam.system import Estimate, register
 
 
 @register("odometry")
-class OdometrySlam:
+class OdometrySlam(OnPath):
     """Chains odometry from the first frame; no map.
 
     The covariance is the propagated sum of the increments' own covariances, or, where a stream
@@ -59,11 +58,3 @@ class OdometrySlam:
         return Estimate(
             stamp_ns=frame.stamp_ns, T_map_robot=T_map_robot, covariance=self._covariance
         )
-
-    def map(self) -> Raster | None:
-        """None: odometry has no map."""
-        return None
-
-    def trajectory(self) -> Trajectory:
-        """The online poses."""
-        return self._path.trajectory()

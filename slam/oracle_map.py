@@ -24,8 +24,7 @@ from slam.errors import InvalidValueError
 from slam.estimate import Estimate, Raster
 from slam.frames import Float, Frame, Odometry
 from slam.frontend.deskew import end_points
-from slam.path import PosePath
-from slam.trajectory import Trajectory
+from slam.path import OnPath, PosePath
 
 KERNELS_M = (0.2, 0.1, 0.05)  # half weight at 0.64 of it; coarse to fine
 STEPS = 4  # of Gauss and Newton with each kernel
@@ -43,7 +42,7 @@ BEAMS, BEST = 45, 20  # that a search looks at; poses of which it refines and co
 FOUND = (0.1, 0.1, math.radians(3.0))  # spread of a pose that a search proposes, m, m, rad
 
 
-class MapOracle:
+class MapOracle(OnPath):
     """A control, no contestant: it must be shown the true map (``know``) before the first frame.
 
     Raises ``InvalidValueError`` for frames without a scan or out of order, or without a map.
@@ -100,14 +99,6 @@ class MapOracle:
             stamp_ns=frame.stamp_ns, T_map_robot=self._T_map_robot, covariance=self._spread,
             converged=walls >= ENOUGH, diagnostics={"on_walls": walls},
         )  # fmt: skip
-
-    def map(self) -> Raster | None:
-        """None: the map was given."""
-        return None
-
-    def trajectory(self) -> Trajectory:
-        """The online poses."""
-        return self._path.trajectory()
 
     def _predicted(self, now: Odometry) -> tuple[Float, Float]:
         """Pose and covariance (3, 3) by odometry."""

@@ -21,7 +21,6 @@ Who wants one of these asks whether it is there (``slam.replay.Track``), never f
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import inspect
 import os
@@ -32,7 +31,7 @@ from functools import partial
 from pathlib import Path
 from typing import Any, Protocol, TypeVar, runtime_checkable
 
-from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError
+from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError, meant
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame
 from slam.names import first_line, join_folders, refuse_code
@@ -201,11 +200,9 @@ def check_name(name: str) -> None:
     own = base in OWN or f"{base}:" in OWN_PREFIXES or name == MAP_ORACLE
     if ":" in base or own or base in _registry:
         return
-    near = difflib.get_close_matches(base, names(), n=1)
-    hint = f" Did you mean '{near[0]}'?" if near else ""
     raise UnknownNameError(
-        f"no SLAM is called '{base}'.{hint} Known: {', '.join(names())}, or module:Class, "
-        "or pipe:COMMAND, or ros2[:COMMAND], or oracle(SLAM)."
+        f"no SLAM is called '{base}'.{meant(base, names())} Known: {', '.join(names())}, "
+        "or module:Class, or pipe:COMMAND, or ros2[:COMMAND], or oracle(SLAM)."
     )
 
 

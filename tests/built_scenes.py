@@ -30,6 +30,15 @@ def model_of(name: str) -> mujoco.MjModel:
     return built(name, 0).compile()
 
 
+def placed(scene: Scene) -> tuple[mujoco.MjModel, mujoco.MjData]:
+    """As it starts, its forces and contacts computed."""
+    model = scene.compile()
+    data = mujoco.MjData(model)
+    scene.place(model, data)
+    mujoco.mj_forward(model, data)
+    return model, data
+
+
 def in_view(model: mujoco.MjModel, camera: str, bounds: tuple[float, ...]) -> bool:
     """Whether a 16:9 picture shows the whole floor."""
     data = mujoco.MjData(model)

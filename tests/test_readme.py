@@ -3,13 +3,12 @@
 
 from __future__ import annotations
 
-import os
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
+
+from tests.processes import python
 
 REPO = Path(__file__).resolve().parents[1]
 README = (REPO / "README.md").read_text()
@@ -23,13 +22,7 @@ def blocks(page: str) -> list[str]:
 
 
 def run(*command: str) -> str:
-    environment = {**os.environ, "PYTHONPATH": str(REPO), "COLUMNS": "200"}
-    done = subprocess.run(
-        [sys.executable, *command], capture_output=True, text=True, cwd=REPO, env=environment,
-        check=False, timeout=120,
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
-    return done.stdout
+    return str(python(*command).stdout)
 
 
 def test_the_readme_is_short_and_shows_how_to_start():

@@ -9,9 +9,10 @@ from __future__ import annotations
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
+from numpy.typing import ArrayLike, NDArray
 
 from slam import se2
 from slam.frames import Frame, LaserSpec, Odometry, Scan, to_ns
@@ -152,6 +153,27 @@ class Wheels:
     scale_sd: float = 0.02
     difference_sd: float = 0.004
     base: float = 0.4
+
+
+def frame_at(
+    stamp_ns: int,
+    odometry: ArrayLike = (0.0, 0.0, 0.0),
+    ranges: ArrayLike | None = None,
+    spec: LaserSpec | None = None,
+    *,
+    twist: ArrayLike | None = None,
+    **more: Any,
+) -> Frame:
+    """One frame with odometry there, and a scan of those ranges if there are any."""
+    wheels = Odometry(
+        stamp_ns=stamp_ns,
+        T_odom_robot=np.array(odometry, float),
+        twist=None if twist is None else np.array(twist, float),
+    )
+    if ranges is not None:
+        scanned = np.asarray(ranges, np.float32)
+        more["scan"] = Scan(stamp_ns=stamp_ns, ranges=scanned, spec=spec or laser())
+    return Frame(stamp_ns=stamp_ns, odometry=wheels, **more)
 
 
 def frames(

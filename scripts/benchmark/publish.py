@@ -112,7 +112,15 @@ def publish(docs: Path, results: Path, aged: Path | None, commit: str) -> None:
     """Draw and fill; raises ``LogFormatError`` for a folder without scores over days."""
     if aged is not None:
         days.read(aged / days.NAMES[1])
-        _copy_days(aged / days.NAMES[1], results / days.NAMES[1], commit)
+        # the file, with the command that makes it and the commit on top if there is a commit
+        source = aged / days.NAMES[1]
+        copy = results / days.NAMES[1]
+        text = source.read_text(encoding="utf-8")
+        if commit:
+            command = json.dumps(_made_days(json.loads(text)))
+            head = f'{{\n "command": {command},\n "commit": {json.dumps(commit)},\n'
+            text = text.replace("{\n", head, 1)
+        write_text(copy, text)
     of = published.read()
     board = board_of(of)
     overall(board.ranking, _ranked_runs(board), docs / "pictures" / "benchmark.png")
@@ -129,16 +137,6 @@ _DAYS = (
     "All scores with their intervals: [days.csv](results/days.csv); of each building: "
     "[days.json](results/days.json)."
 )
-
-
-def _copy_days(source: Path, copy: Path, commit: str) -> None:
-    """The file, with the command that makes it and the commit on top if there is a commit."""
-    text = source.read_text(encoding="utf-8")
-    if commit:
-        command = json.dumps(_made_days(json.loads(text)))
-        head = f'{{\n "command": {command},\n "commit": {json.dumps(commit)},\n'
-        text = text.replace("{\n", head, 1)
-    write_text(copy, text)
 
 
 def _made_days(told: dict[str, Any]) -> str:

@@ -188,7 +188,7 @@ def read(path: Path) -> Submission:
     Raises ``LogFormatError`` for a file that is damaged, something else or of other tracks,
     ``WorldVersionError`` for one of a newer version of the world.
     """
-    data = load(path, WHAT, SCHEMA, _refuse)
+    data = load(path, WHAT, SCHEMA, strict=True)
     check_vouched(path)
     if data.get("what") != WHAT:
         raise LogFormatError(path, f"no {WHAT}")
@@ -199,10 +199,6 @@ def read(path: Path) -> Submission:
         return _submission(path, data)
     except (KeyError, TypeError, AttributeError, RecursionError, InvalidValueError) as error:
         raise LogFormatError(path, f"no submission: {type(error).__name__}: {error}") from error
-
-
-def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is no JSON number")
 
 
 def _submission(path: Path, data: Row) -> Submission:

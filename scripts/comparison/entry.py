@@ -229,7 +229,9 @@ def scored(
     if failure is not None:
         outcome = getattr(failure, "outcome", "raised")
         if lost_at_s is None:
-            lost_at_s = _failed_at_s(track, truth)
+            # of the scan that it did not answer
+            k = min(len(track.estimates), len(truth) - 1)
+            lost_at_s = float(truth.stamps_ns[k] - truth.stamps_ns[0]) / NS_PER_S
         return row | {
             "outcome": outcome, "failure": str(failure), "lost": 1, "lost_at_s": lost_at_s,
         }  # fmt: skip
@@ -249,9 +251,3 @@ def lost_at(online: Trajectory, truth: Trajectory) -> float | None:
     if len(online) == 0:
         return None
     return lost_s(metrics.pose_errors(online, truth), truth)
-
-
-def _failed_at_s(track: Track, truth: Trajectory) -> float:
-    """Of the scan that it did not answer."""
-    k = min(len(track.estimates), len(truth) - 1)
-    return float(truth.stamps_ns[k] - truth.stamps_ns[0]) / NS_PER_S

@@ -309,7 +309,11 @@ class Checkpoint:
         if change != Change():
             absence.apply(simulation, change)
         if noise:
-            _redraw(simulation, noise)
+            seed = simulation.world.seeds.integer("lidar")
+            for k, stream in enumerate(simulation.laser.streams):
+                stream.bit_generator.state = np.random.default_rng(
+                    [seed, noise, k]
+                ).bit_generator.state
         track = self._slam()
         strip = Strip()
         ear = _Ear(simulation, strip, track, case.every)
@@ -327,12 +331,6 @@ class Checkpoint:
         for frame in self.tape.strip.frames[: self.row]:
             track.take(frame)
         return track
-
-
-def _redraw(simulation: Simulation, noise: int) -> None:
-    seed = simulation.world.seeds.integer("lidar")
-    for k, stream in enumerate(simulation.laser.streams):
-        stream.bit_generator.state = np.random.default_rng([seed, noise, k]).bit_generator.state
 
 
 def _equal(ours: Sequence[Float], theirs: Sequence[Float]) -> bool:

@@ -14,6 +14,7 @@ from importlib import metadata
 from pathlib import Path
 from typing import Literal
 
+import joblib
 from packaging.requirements import Requirement
 
 import mobilia
@@ -143,7 +144,8 @@ def _drawing() -> Iterator[Finding]:
 
 
 def _machine() -> Iterator[Finding]:
-    yield Finding(what="cores", state="ok", found=f"{cores()} for this process: --jobs {cores()}")
+    cores = joblib.cpu_count()
+    yield Finding(what="cores", state="ok", found=f"{cores} for this process: --jobs {cores}")
     folder = cache_folder()
     writable = folder is not None and os.access(_there(folder), os.W_OK)
     told = str(folder) if writable else "cannot be written: each start compiles for a minute"
@@ -158,13 +160,6 @@ def _machine() -> Iterator[Finding]:
     how = "outputs go to --out: name a folder on another disk"
     enough = free_gb >= LEAST_FREE_GB
     yield _usable("disk, working folder", enough, f"{free_gb:.1f} GB free", how)
-
-
-def cores() -> int:
-    """Those that this process may run on."""
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
 
 
 def cache_folder() -> Path | None:

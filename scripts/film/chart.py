@@ -140,7 +140,10 @@ class ErrorChart:
             word = f"{degrees:+g}°" if degrees else "0°"
             self._rule(picture, 1, math.radians(degrees), reach, word)
         start, end = self._span
-        step = _nice_step(end - start)
+        # between marks of the time axis: six to thirteen of them
+        span_s = end - start
+        power = 10.0 ** math.floor(math.log10(span_s))
+        step = next(s * power for s in (0.1, 0.2, 0.5, 1.0) if span_s / (s * power) <= 12.5)
         for k in range(math.ceil(start / step - 1e-9), math.floor(end / step + 1e-9) + 1):
             x, word = round(float(self._x(np.array([k * step]))[0])), f"{k * step:g} s"
             cv2.line(picture, (x, self._boxes[0].y), (x, self._bottom), draw.GRID, 1)
@@ -255,9 +258,3 @@ def _turned(degrees: float, reach: float) -> str:
 
 def _faint(color: Color) -> Color:
     return draw.paler(color, 0.72)
-
-
-def _nice_step(span_s: float) -> float:
-    """Between marks of the time axis: six to thirteen of them."""
-    power = 10.0 ** math.floor(math.log10(span_s))
-    return next(s * power for s in (0.1, 0.2, 0.5, 1.0) if span_s / (s * power) <= 12.5)

@@ -63,14 +63,6 @@ def raster_picture(raster: Raster, view: View, T_view_map: Float) -> Picture:
     return picture
 
 
-def draw_points(picture: Picture, view: View, points: Float, color: Color) -> None:
-    """Scan end points as dots."""
-    x, y = np.round(view.pixels(points)).astype(int).T
-    inside = (x >= 0) & (x < view.width - 1) & (y >= 0) & (y < view.height - 1)
-    for dx, dy in ((0, 0), (0, 1), (1, 0), (1, 1)):
-        picture[y[inside] + dy, x[inside] + dx] = color
-
-
 def draw_ellipse(
     picture: Picture,
     view: View,
@@ -139,7 +131,11 @@ class MapPane:
             pose = se2.compose(T_view_map, path.pose)
             draw.polyline(picture, view.pixels(points), color, max(1, round(width * self.unit)))
             draw.robot(picture, view, pose, color)
-        draw_points(picture, view, se2.transform(T_view_map, points_map), draw.BLUE)
+        # scan end points as dots
+        x, y = np.round(view.pixels(se2.transform(T_view_map, points_map))).astype(int).T
+        inside = (x >= 0) & (x < view.width - 1) & (y >= 0) & (y < view.height - 1)
+        for dx, dy in ((0, 0), (0, 1), (1, 0), (1, 1)):
+            picture[y[inside] + dy, x[inside] + dx] = draw.BLUE
         own, color, _ = paths[-1]
         turn = se2.rotation(float(T_view_map[2]))
         turned = turn @ covariance[:2, :2] @ turn.T

@@ -120,7 +120,14 @@ class Show:
         for name in self.replay.tracks:
             self.series.setdefault(name, Series()).add(shown, name)
         if not here.converged:
-            self._note_doubt(shown.seconds)
+            before = self.unsure[-1] if self.unsure else None
+            if before is not None and shown.seconds - before.end_s < 0.5:
+                self.unsure[-1] = replace(before, end_s=shown.seconds)
+            else:
+                doubt = Event(
+                    kind=UNSURE, name="", start_s=shown.seconds, end_s=shown.seconds, seen=True
+                )
+                self.unsure.append(doubt)
         if self._moved != self.moments.moved:  # what was seen lies elsewhere on the map now
             self._moved, self.seen = self.moments.moved, SeenSpace()
             for (_, scan), pose in zip(self._scans, self._poses(), strict=True):
@@ -158,14 +165,6 @@ class Show:
         assert isinstance(system, MovingMap)
         poses = system.poses_in_map()
         return [poses[number] for number, _ in self._scans]
-
-    def _note_doubt(self, seconds: float) -> None:
-        before = self.unsure[-1] if self.unsure else None
-        if before is not None and seconds - before.end_s < 0.5:
-            self.unsure[-1] = replace(before, end_s=seconds)
-        else:
-            doubt = Event(kind=UNSURE, name="", start_s=seconds, end_s=seconds, seen=True)
-            self.unsure.append(doubt)
 
 
 class _Panes:

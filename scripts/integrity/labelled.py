@@ -26,8 +26,7 @@ from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import coarse
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
-from slam.tracker.matching.matcher import Match
-from slam.tracker.matching.usual import Usual
+from slam.tracker.matching.matcher import Match, Usual
 from slam.tracker.matching.whole_search import WholeSearch
 
 RIGHT_M, RIGHT_RAD = 0.15, 0.1  # a place nearer than both is right

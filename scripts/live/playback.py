@@ -8,57 +8,39 @@ import queue
 import time
 from collections import deque
 from collections.abc import Callable, Iterator
-from dataclasses import dataclass, field, fields
-from typing import Any
+from dataclasses import dataclass
+from typing import Annotated
+
+from msgspec import Meta
 
 from scripts.live import FASTEST, SLOWEST
-from sim.core.checks import FAR_M, three, within, word
+from sim.core.checks import Point, Word
 from sim.view.moment import Shown
 from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError, MobiliaError
+from slam.shaped import Share, check
 
 MOST_WAITING = 64  # requests; a client that sends more is told so
 MOST_TWIST = 1e3  # m/s and rad/s; the drive clips to what it can do
 
 
-def _number(low: float, high: float, default: Any = ...) -> Any:
-    """A field for a finite number in [low, high]."""
-    known = {} if default is ... else {"default": default}
-    return field(metadata={"low": low, "high": high}, **known)
+Twist = Annotated[float, Meta(ge=-MOST_TWIST, le=MOST_TWIST)]
 
 
-def _point(default: Any = ...) -> Any:
-    """A field for three numbers that a place may have."""
-    known = {} if default is ... else {"default": default}
-    return field(metadata={"low": -FAR_M, "high": FAR_M, "three": True}, **known)
-
-
-@dataclass(frozen=True, kw_only=True)
 class _Checked:
     """Checked at birth: ``InvalidValueError`` names the field, the value and what was expected."""
 
     def __post_init__(self) -> None:
-        for one in fields(self):
-            value, what = getattr(self, one.name), f"{type(self).__name__.lower()}: {one.name}"
-            if value is None and one.default is None:
-                continue
-            if one.metadata.get("three"):
-                three(what, value)
-            elif "low" in one.metadata:
-                within(what, value, one.metadata["low"], one.metadata["high"])
-            elif one.type != "bool":
-                word(what, value)
-            elif not isinstance(value, bool):
-                raise InvalidValueError(f"{what} must be true or false, got {value!r:.60}")
+        check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Drive(_Checked):
     """Twist for the robot, m/s, rad/s, and m/s to the left."""
 
-    v: float = _number(-MOST_TWIST, MOST_TWIST)
-    omega: float = _number(-MOST_TWIST, MOST_TWIST)
-    side: float = _number(-MOST_TWIST, MOST_TWIST, 0.0)
+    v: Twist
+    omega: Twist
+    side: Twist = 0.0
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -70,8 +52,8 @@ class Tour(_Checked):
 class Click(_Checked):
     """A click on what is shown, as a ray in the world: touch what it hits, or carry the robot."""
 
-    origin: tuple[float, float, float] = _point()
-    direction: tuple[float, float, float] = _point()
+    origin: Point
+    direction: Point
     carry: bool = False
 
     def __post_init__(self) -> None:
@@ -96,14 +78,14 @@ class Step(_Checked):
 class Seek(_Checked):
     """Show the moment that is ``back_s`` before the present, or the one kept nearest to that."""
 
-    back_s: float = _number(0.0, 1e9)
+    back_s: Annotated[float, Meta(ge=0.0, le=1e9)]
 
 
 @dataclass(frozen=True, kw_only=True)
 class Speed(_Checked):
     """How fast the view goes, 1 is real time."""
 
-    factor: float = _number(SLOWEST, FASTEST)
+    factor: Annotated[float, Meta(ge=SLOWEST, le=FASTEST)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -113,10 +95,10 @@ class Anew(_Checked):
     slam, crowd  by name;   motion, change  0 to 1; None: as it was
     """
 
-    slam: str | None = None
-    motion: float | None = _number(0.0, 1.0, None)
-    change: float | None = _number(0.0, 1.0, None)
-    crowd: str | None = None
+    slam: Word | None = None
+    motion: Share | None = None
+    change: Share | None = None
+    crowd: Word | None = None
 
 
 OnWorld = Drive | Tour | Push | MoveDoor | Kidnap | Click

@@ -62,7 +62,11 @@ def run_one(path: Path, *, moving: float, seed: int, steps: int, keep: bool) -> 
     world = PointWorld(PointWorldConfig(moving=moving, n_steps=steps), seed=seed)
     frames = list(world.stream())
     truth = truth_of(frames)
-    static = _static_seen_twice(world, frames)
+    counts = np.zeros(world.config.n_points, dtype=np.int64)
+    for frame in frames:
+        if frame.features is not None and frame.features.ids is not None:
+            counts[frame.features.ids] += 1
+    static = set(np.flatnonzero((counts >= 2) & ~world.moving).tolist())
     T_first_world = se2.inverse(world.path[0])
     true_points = se2.transform(T_first_world, world.points[0][sorted(static)])
     known, known_points = with_known_associations(frames, set(np.flatnonzero(~world.moving)))
@@ -86,14 +90,6 @@ def run_one(path: Path, *, moving: float, seed: int, steps: int, keep: bool) -> 
     if keep:
         arrays |= map_arrays(ekf) | map_arrays(ours)
     save_run(path, numbers, arrays)
-
-
-def _static_seen_twice(world: PointWorld, frames: Sequence[Frame]) -> set[int]:
-    counts = np.zeros(world.config.n_points, dtype=np.int64)
-    for frame in frames:
-        if frame.features is not None and frame.features.ids is not None:
-            counts[frame.features.ids] += 1
-    return set(np.flatnonzero((counts >= 2) & ~world.moving).tolist())
 
 
 def _counted(system: Any, frames: Sequence[Frame], true_points: Float) -> tuple[Track, Census]:

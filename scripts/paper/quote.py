@@ -41,7 +41,12 @@ def quote(results: Path, folder: Path) -> list[str]:
         told = summary.read_text().strip()
         found[name] = _PICTURE.findall(told)
         told = _PICTURE.sub(rf"]({PICTURES}/{name}-\1)", told)
-        page = _page_of(name, texts, folder)
+        # the one page that has the mark
+        pages = [page for page, text in texts.items() if f"<!-- {name} -->" in text]
+        if len(pages) != 1:
+            have = ", ".join(page.name for page in pages) or "no page"
+            raise InvalidValueError(f"{folder}: {have} has <!-- {name} -->, must be one page")
+        page = pages[0]
         told = with_tables_apart(told, f"paper_{name}", folder / RESULTS, folder)
         texts[page] = filled(texts[page], name, told, page)
     for name, files in found.items():
@@ -49,15 +54,6 @@ def quote(results: Path, folder: Path) -> list[str]:
     for page, text in texts.items():
         write_text(page, text)
     return list(found)
-
-
-def _page_of(name: str, texts: dict[Path, str], folder: Path) -> Path:
-    """The one page that has the mark."""
-    pages = [page for page, text in texts.items() if f"<!-- {name} -->" in text]
-    if len(pages) != 1:
-        have = ", ".join(page.name for page in pages) or "no page"
-        raise InvalidValueError(f"{folder}: {have} has <!-- {name} -->, must be one page")
-    return pages[0]
 
 
 def _take_pictures(source: Path, files: list[str], folder: Path, name: str) -> None:

@@ -26,10 +26,9 @@ from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import Float, Frame
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_steps import thinned
-from slam.shunting.config import ShuntingConfig
 from slam.shunting.featured import FeaturedShuntingSlam
 from slam.shunting.map.network import Network
-from slam.shunting.slam import ShuntingSlam
+from slam.shunting.slam import ShuntingConfig, ShuntingSlam
 from slam.tracker.cells import SIDE, Look
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise

@@ -119,9 +119,7 @@ def _print_dynamism(as_json: bool) -> None:
 
 def _trees(what: str) -> tuple[Settings, Settings]:
     """That tree and its default."""
-    import difflib
-
-    from slam.errors import UnknownNameError
+    from slam.errors import UnknownNameError, meant
 
     if what == "actors":
         from sim.actors.config import ACTORS
@@ -135,10 +133,7 @@ def _trees(what: str) -> tuple[Settings, Settings]:
 
         known = [name for name in names() if config_of(name) is not None]
         known += [*ROOMS, *registry.names()]
-        near = (
-            [] if what in names() else difflib.get_close_matches(what.partition("{")[0], known, 1)
-        )
-        hint = f" Did you mean '{near[0]}'?" if near else ""
+        hint = "" if what in names() else meant(what.partition("{")[0], known)
         raise UnknownNameError(
             f"'{what}' has no numbers to set.{hint} These have: {', '.join(known)}"
         )
@@ -146,9 +141,7 @@ def _trees(what: str) -> tuple[Settings, Settings]:
 
 
 def _chosen(rows: list[Row], group: str) -> list[Row]:
-    import difflib
-
-    from slam.errors import UnknownNameError
+    from slam.errors import UnknownNameError, meant
 
     def within(path: str) -> bool:
         return not group or f"{path}.".startswith(f"{group}.")
@@ -156,8 +149,8 @@ def _chosen(rows: list[Row], group: str) -> list[Row]:
     chosen = [row for row in rows if within(row.path) or within(row.about.alias or row.path)]
     if not chosen:
         groups = sorted({row.path.rpartition(".")[0] for row in rows} - {""})
-        near = difflib.get_close_matches(group, [*groups, *(r.path for r in rows)], n=1, cutoff=0.5)
-        hint = f" Did you mean '{near[0]}'?" if near else f" Groups: {', '.join(groups)}"
+        hint = meant(group, [*groups, *(r.path for r in rows)], 0.5)
+        hint = hint or f" Groups: {', '.join(groups)}"
         raise UnknownNameError(f"no number's path begins with '{group}'.{hint}")
     return chosen
 

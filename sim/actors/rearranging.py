@@ -190,7 +190,13 @@ class Rearranging:
         for row in left:
             self._move(time_s, row, poses, view, done)
         for row in back:
-            self._bring_in(time_s, row, poses, view, done)
+            luck, before = self._luck(row), poses[row].copy()
+            uniform(luck, 0)
+            found = self._find(row, poses, view, luck)
+            if found is not None:
+                sort, poses[row] = found
+                self.marks[row] = 0, 0, int(sort == IN_ROW)
+                self._note(time_s, row, "brought in", before, poses[row], done)
         return done
 
     def _luck(self, row: int) -> NDArray[np.uint64]:
@@ -295,17 +301,6 @@ class Rearranging:
         self.marks[row, PARKED] = int(sort == IN_ROW)
         change = "parked" if sort == IN_ROW else "unparked" if was else "moved"
         self._note(time_s, row, change, before, poses[row], done)
-
-    def _bring_in(
-        self, time_s: float, row: int, poses: Float, view: View, done: list[Rearrangement]
-    ) -> None:
-        luck, before = self._luck(row), poses[row].copy()
-        uniform(luck, 0)
-        found = self._find(row, poses, view, luck)
-        if found is not None:
-            sort, poses[row] = found
-            self.marks[row] = 0, 0, int(sort == IN_ROW)
-            self._note(time_s, row, "brought in", before, poses[row], done)
 
     def _note(
         self, time_s: float, row: int, change: str, before: Float, after: Float,

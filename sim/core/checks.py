@@ -12,11 +12,14 @@ from slam.errors import InvalidValueError
 from slam.shaped import Number, instance, one_of, shaped, within
 
 __all__ = [
-    "FAR_M", "MOST_LETTERS", "instance", "number", "numbers", "one_of", "switch", "three", "whole",
+    "FAR_M", "MOST_LETTERS", "instance", "number", "numbers", "one_of", "switch", "whole",
     "whole_numbers", "within", "word",
 ]  # fmt: skip
 MOST_LETTERS = 100  # of a name
 FAR_M = 1e6  # no place of a scene is farther away
+Word = Annotated[str, Meta(max_length=MOST_LETTERS)]
+Metres = Annotated[float, Meta(ge=-FAR_M, le=FAR_M)]
+Point = tuple[Metres, Metres, Metres]
 
 
 def number(name: str, value: Any) -> None:
@@ -63,9 +66,3 @@ def word(what: str, value: Any) -> str:
             f"{what} must be a name of up to {MOST_LETTERS} letters, got {value!r:.60}"
         )
     return value
-
-
-def three(what: str, value: Any) -> None:
-    """Three numbers that a place may have; ``InvalidValueError`` for anything else."""
-    one = Annotated[float, Meta(ge=-FAR_M, le=FAR_M)]
-    shaped(what, value, tuple[one, one, one])

@@ -7,7 +7,6 @@ part asks for a stream by name; ``Seeds(3, lidar=7)`` is run 3 with the scanner 
 
 from __future__ import annotations
 
-import difflib
 import math
 from collections.abc import Mapping
 
@@ -15,7 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import uncounted
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.errors import InvalidValueError, UnknownNameError, meant
 
 # Inside kernels a generator is one number in an array, saved with it: SplitMix64 (Steele,
 # Lea, Flood 2014, "Fast splittable pseudorandom number generators").
@@ -123,8 +122,7 @@ def _checked(name: str, value: int) -> int:
 
 def _stream(name: str) -> int:
     if name not in STREAMS:
-        near = difflib.get_close_matches(name, STREAMS, n=1)
-        hint = f" Did you mean '{near[0]}'?" if near else ""
+        hint = meant(name, STREAMS)
         raise UnknownNameError(
             f"no stream of randomness is called '{name}'.{hint} Known: {', '.join(STREAMS)}."
         )

@@ -33,7 +33,7 @@ from sim.world.robots import robot_of
 from sim.world.script import cues_of
 from sim.world.times_of_day import checked
 from sim.world.world import World
-from slam.bounded import text_of
+from slam.bounded import json_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.files import write_text
 from slam.names import NameFromFile
@@ -294,13 +294,9 @@ def read_recipe(path: Path) -> Made:
     The scene's name is one from a file: no code runs by it (``slam.names``). The recipe may be of
     another version of the world: ``sim.core.versions.check_world`` before it is simulated.
     """
-    text = text_of(path, MAX_BYTES)
-    try:
-        data = json.loads(text, parse_constant=_refuse)
-    except (ValueError, RecursionError) as error:
-        raise LogFormatError(path, f"no recipe: {error}") from error
+    data = json_of(path, MAX_BYTES, "recipe")
     wanted = ("schema", "recipe", "recipe_sha256", "made_with", "result")
-    if not isinstance(data, dict) or any(name not in data for name in wanted):
+    if any(name not in data for name in wanted):
         raise LogFormatError(path, f"no recipe: expected {', '.join(wanted)}")
     if data["schema"] != SCHEMA:
         raise LogFormatError(path, f"recipe of schema {data['schema']!r}, expected {SCHEMA}")
@@ -319,7 +315,3 @@ def read_recipe(path: Path) -> Made:
     if recipe.sha256 != data["recipe_sha256"]:
         raise LogFormatError(path, "damaged: recipe_sha256 is not that of the recipe")
     return Made(recipe=recipe, made_with=parts[1], result=parts[2], world=world_of(path, data))
-
-
-def _refuse(constant: str) -> float:
-    raise ValueError(f"{constant} is no JSON number")

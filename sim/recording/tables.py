@@ -130,13 +130,6 @@ class Thing:
     pose: Pose | None
 
 
-def days_of(recipe: Recipe) -> Days:
-    """The building of a recipe that has a session."""
-    seeds = Seeds(recipe.seed)
-    scene = build(recipe.scene, seed=seeds.integer("layout"), **recipe.options)
-    return Days(scene, seeds, recipe.share_changed)
-
-
 def things(days: Days, sessions: int) -> list[Thing]:
     """Where everything stands in the first so many sessions."""
     found = []
@@ -184,7 +177,10 @@ def _change(before: Pose | None, after: Pose | None) -> str:
 
 def write_days(folder: Path, recipe: Recipe, sessions: int) -> None:
     """All ``FILES`` of a dataset whose sessions have that recipe but for their number."""
-    days = days_of(recipe)
+    # the building of a recipe that has a session
+    seeds = Seeds(recipe.seed)
+    scene = build(recipe.scene, seed=seeds.integer("layout"), **recipe.options)
+    days = Days(scene, seeds, recipe.share_changed)
     known = things(days, sessions)
     rows = [(t.session, t.time_of_day, t.name, t.kind, *pose_words(t.pose)) for t in known]
     write_text(folder / THINGS, table(THING_COLUMNS, rows))

@@ -13,7 +13,7 @@ from numpy.typing import NDArray
 
 from scenes.kinds import kind_of
 from sim.moments import Moment
-from sim.sensors.lidar.device import LaserScanner, ScanResult
+from sim.sensors.lidar.device import LaserScanner
 from sim.world.labels import BeamLabeller
 from sim.world.world import World
 from slam._jit import njit
@@ -148,7 +148,9 @@ class TwinRoom:
             poses = self.world.mover_poses()
             self._steps = iter(path[present + 1 :])
             result = self._laser.observe(lambda: self._put(next(self._steps)), self.world.data)
-            self._saw(result, period)
+            movers = self.world.bodies.mover_of_body[result.bodies[result.bodies >= 0]]
+            self._unseen += period
+            self._unseen[np.unique(movers[movers >= 0])] = 0.0
             stamp_ns = odometry[k].stamp_ns
             frame = Frame(
                 stamp_ns=stamp_ns,
@@ -158,11 +160,6 @@ class TwinRoom:
                 labels=self._labeller.label(result) if self._labeller else None,
             )
             yield Moment(frame=frame, poses=poses, moving=resting)
-
-    def _saw(self, result: ScanResult, period: float) -> None:
-        movers = self.world.bodies.mover_of_body[result.bodies[result.bodies >= 0]]
-        self._unseen += period
-        self._unseen[np.unique(movers[movers >= 0])] = 0.0
 
     def _displace(self, k: int) -> None:
         """Move what is out of sight to where it rests in the dynamic version at scan ``k``."""

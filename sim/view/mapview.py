@@ -185,16 +185,12 @@ def _outlines(scene: Scene) -> list[_Outline]:
         elif wall:
             continue  # the upper edge of a door has the walls' colour
         else:
-            points = _in_frame(points, parts.home[owner])
+            # (k, 3) m of the world in the frame of a pose on its floor
+            flat = se2.transform(se2.inverse(parts.home[owner]), points[:, :2])
+            points = np.column_stack([flat, points[:, 2]])
         hull = cv2.convexHull(points[:, :2].astype(np.float32))[:, 0].astype(np.float64)
         found.append(_Outline(owner, top, hull, color, draw.darker(color, RIM)))
     tops = [
         max((o.top for o in found if o.owner == k), default=0.0) for k in range(len(parts.home))
     ]
     return sorted(found, key=lambda o: (0.0 if o.owner == STATIC else tops[o.owner], o.top))
-
-
-def _in_frame(points: Float, pose: Float) -> Float:
-    """(k, 3) m of the world in the frame of a pose on its floor."""
-    flat = se2.transform(se2.inverse(pose), points[:, :2])
-    return np.column_stack([flat, points[:, 2]])

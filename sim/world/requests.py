@@ -5,11 +5,15 @@ from __future__ import annotations
 
 import math
 from dataclasses import dataclass
+from typing import Annotated
 
-from sim.core.checks import FAR_M, numbers, switch, three, within, word
+from msgspec import Meta
+
+from sim.core.checks import Metres, Point, Word
 from sim.world import hands
 from sim.world.hands import MOST_HOLD_S, MOST_SPEED
 from sim.world.world import World
+from slam.shaped import check
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -20,18 +24,13 @@ class Push:
     heading  rad; None: away from the robot, or ``towards`` a place (x m, y m)
     """
 
-    name: str = ""
-    speed: float = 1.0
-    heading: float | None = None
-    towards: tuple[float, float] | None = None
+    name: Word = ""
+    speed: Annotated[float, Meta(ge=0.05, le=MOST_SPEED)] = 1.0
+    heading: Annotated[float, Meta(ge=-100.0, le=100.0)] | None = None
+    towards: tuple[Metres, Metres] | None = None
 
     def __post_init__(self) -> None:
-        word("push: name", self.name)
-        within("push: speed", self.speed, 0.05, MOST_SPEED)
-        within("push: heading", self.heading or 0.0, -100.0, 100.0)
-        if self.towards is not None:
-            for value in numbers("push: towards", self.towards, 2, "two numbers, x and y in m"):
-                within("push: towards", value, -FAR_M, FAR_M)
+        check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,26 +38,22 @@ class MoveDoor:
     """Hold a door, "" for the nearest to the robot, open or shut for so long, s."""
 
     opened: bool
-    name: str = ""
-    seconds: float = 20.0
+    name: Word = ""
+    seconds: Annotated[float, Meta(ge=0.1, le=MOST_HOLD_S)] = 20.0
 
     def __post_init__(self) -> None:
-        switch("door: opened", self.opened)
-        word("door: name", self.name)
-        within("door: seconds", self.seconds, 0.1, MOST_HOLD_S)
+        check(self)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Kidnap:
     """Carry the robot to a pose (m, m, rad) in the world, to a goal, or to the farthest goal."""
 
-    pose: tuple[float, float, float] | None = None
-    goal: str = ""
+    pose: Point | None = None
+    goal: Word = ""
 
     def __post_init__(self) -> None:
-        word("kidnap: goal", self.goal)
-        if self.pose is not None:
-            three("kidnap: pose", self.pose)
+        check(self)
 
 
 def carry_out(world: World, request: Push | MoveDoor | Kidnap) -> str:

@@ -29,6 +29,7 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
+from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse, spread
 from slam.tracker.belief.posterior import Odds, probabilities
@@ -38,7 +39,6 @@ from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
 
 # Finding the start; set by hand.
-LENIENT = 10.0  # times belief.frozen_above: a start that is found must fit, too
 STEP_M = 0.02  # m, deviation of the motion between two scans
 STEP_RAD = 0.01  # rad, the same of the turn
 BUFFER = 200  # scans, kept to be merged when the place is found

@@ -23,7 +23,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.ekf.config import EkfConfig
 from slam.errors import InvalidValueError
-from slam.estimate import Estimate, Landmarks, Raster
+from slam.estimate import Estimate, Landmarks
 from slam.frames import Features, Float, Frame, Odometry, Scan
 from slam.frontend import odometry_steps
 from slam.frontend.corners import answered, corners
@@ -31,9 +31,8 @@ from slam.frontend.odometry_prior import assumed_covariance
 from slam.frontend.polar import hidden, polar
 from slam.landmarks.association import METHODS
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
-from slam.path import PosePath
+from slam.path import OnPath, PosePath
 from slam.system import register
-from slam.trajectory import Trajectory
 
 CHANCE = 0.05  # probability of something else where a landmark was; set by hand
 WITHIN = 0.95  # share of range and field of view: surely in view
@@ -160,7 +159,7 @@ class _Pairs:
 
 
 @register("ekf")
-class EkfSlam:
+class EkfSlam(OnPath):
     """EKF-SLAM on point landmarks: IPJC association, landmarks that are confirmed and deleted.
 
     Takes ``frame.features``; where a frame has only a scan, corners are extracted from it. Options
@@ -347,14 +346,6 @@ class EkfSlam:
             covariances=self.filter.landmark_covariances()[confirmed],
             looks=self.lifecycle.looks[confirmed],
         )
-
-    def map(self) -> Raster | None:
-        """None: the map is a list of landmarks, see ``landmarks()``."""
-        return None
-
-    def trajectory(self) -> Trajectory:
-        """The online poses: a filter does not revise its past."""
-        return self._path.trajectory()
 
 
 def _regular(covariances: Float) -> Float:

@@ -169,7 +169,8 @@ def corners(scan: Scan, *, twist: Float | None = None) -> Features:
     for column, row in _peaks(image):
         x, y, cells, ok = refine(image, widths, column, row)
         point = origin + CELL_M * np.array([x, y])
-        beam = _nearest(point, points, valid)
+        away = np.where(valid, ((points - point) ** 2).sum(axis=1), np.inf)
+        beam = int(away.argmin())
         if not ok or _misleads(point, beam, points, false_ends):
             continue
         found.append(point)
@@ -276,11 +277,6 @@ def _peaks(image: Float) -> list[tuple[int, int]]:
     rows, columns = np.nonzero((response >= around) & (response > RESPONSE * IDEAL))
     order = np.argsort(-response[rows, columns], kind="stable")
     return [(int(columns[k]), int(rows[k])) for k in order]
-
-
-def _nearest(point: Float, points: Float, valid: NDArray[np.bool_]) -> int:
-    away = np.where(valid, ((points - point) ** 2).sum(axis=1), np.inf)
-    return int(away.argmin())
 
 
 def _misleads(point: Float, beam: int, points: Float, false_ends: NDArray[np.bool_]) -> bool:

@@ -16,7 +16,7 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
 from slam.errors import InvalidValueError
-from slam.frames import Features, Float, Frame, LaserSpec, Scan
+from slam.frames import Features, Float, Frame, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import NEAR_CELLS, face, follow_ends, join, unmixed
@@ -205,7 +205,12 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     where that drives more than ``MOST_SWEPT_M`` during it.
     """
     spec = scan.spec
-    _check_swept(spec, twist)
+    swept_m = spec.sweep_duration * math.hypot(float(twist[0]), float(twist[1]))
+    if swept_m > MOST_SWEPT_M:
+        raise InvalidValueError(
+            f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
+            f"got {swept_m:g} m"
+        )
     n = spec.n_beams
     points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
     beams = np.empty(n, np.int64)
@@ -250,15 +255,6 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         T_robot_laser=spec.T_robot_laser,
         sensor_sigma_m=sensor_sigma_m,
     )
-
-
-def _check_swept(spec: LaserSpec, twist: Float) -> None:
-    swept = spec.sweep_duration * math.hypot(float(twist[0]), float(twist[1]))
-    if swept > MOST_SWEPT_M:
-        raise InvalidValueError(
-            f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
-            f"got {swept:g} m"
-        )
 
 
 def _by_bearing(

@@ -69,26 +69,18 @@ class HeadingBias:
         matched    share of the observations matched, the heading found minus the predicted one
                    (rad), and the data's information (3, 3) by (x, y, theta) at their full weight
         """
-        said, given = variances
-        self._move(increment, said, elapsed)
-        share, off, information = matched
-        found = _of_heading(information)
-        kept = found * given / (1.0 + found * given)  # of what the data say, beside the prior
-        if share >= MATCHED and kept >= DATA_SHARE:
-            self._see(se2.wrap(off) / kept, 1.0 / (INDEPENDENT * found))
-
-    def _move(self, increment: Float, variance: float, elapsed: float) -> None:
+        (said, given), (share, off, information) = variances, matched
         P, G = self._P, (1.0, float(increment[0]), float(increment[2]))
         row = [G[0] * P[0][k] + G[1] * P[1][k] + G[2] * P[2][k] for k in range(3)]
-        P[0] = [row[0] * G[0] + row[1] * G[1] + row[2] * G[2] + variance, row[1], row[2]]
+        P[0] = [row[0] * G[0] + row[1] * G[1] + row[2] * G[2] + said, row[1], row[2]]
         P[1][0], P[2][0] = row[1], row[2]
-        config = self._config
-        P[1][1] += config.per_m**2 * elapsed / LASTS_S
-        P[2][2] += config.per_rad**2 * elapsed / LASTS_S
-
-    def _see(self, innovation: float, variance: float) -> None:
-        P = self._P
-        S = P[0][0] + variance
+        P[1][1] += self._config.per_m**2 * elapsed / LASTS_S
+        P[2][2] += self._config.per_rad**2 * elapsed / LASTS_S
+        found = _of_heading(information)
+        kept = found * given / (1.0 + found * given)  # of what the data say, beside the prior
+        if share < MATCHED or kept < DATA_SHARE:
+            return
+        innovation, S = se2.wrap(off) / kept, P[0][0] + 1.0 / (INDEPENDENT * found)
         if innovation * innovation > OUTLIER * S:
             return
         K = [P[j][0] / S for j in range(3)]

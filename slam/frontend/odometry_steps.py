@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From frame to frame: the order of stamps, the motion by odometry, and what can be none."""
+"""From frame to frame: the motion by odometry, and what can be none."""
 
 from __future__ import annotations
 
@@ -19,12 +19,6 @@ MOST_STD = 1e4  # m and rad, of an increment; with more, rounding would eat what
 HUGE = 1.0  # m^2 or rad^2: from there on,
 MOST_CORRELATION = 1.0 - 1e-6  # exact correlations would leave nothing of what is known beside
 LEAST_SHARE = 1e-12  # of the larger variance of position that the smaller one must have
-
-
-def check_order(before_ns: int | None, now_ns: int) -> None:
-    """Raise ``InvalidValueError`` unless the frame at ``now_ns`` comes after the last one."""
-    if before_ns is not None and now_ns <= before_ns:
-        raise InvalidValueError(f"frames must come in order: {now_ns} ns after {before_ns} ns")
 
 
 def known(covariance: Float, most_m: float = MOST_STD, most_rad: float = MOST_STD) -> Float:

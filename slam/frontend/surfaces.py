@@ -128,12 +128,12 @@ def follow_ends(
             if 0 <= after < n and joined[min(k, after)]:
                 continue
             first = before  # far enough back for a direction
-            while _apart(points, first, k) < FACE_M:
+            while apart(points, first, k) < FACE_M:
                 further = first - way
                 if further < 0 or further >= n or not joined[min(first, further)]:
                     break
                 first = further
-            length = _apart(points, first, k)
+            length = apart(points, first, k)
             if length < FACE_M:
                 continue
             tx, ty = (points[k, 0] - points[first, 0]) / length, points[k, 1] - points[first, 1]
@@ -182,9 +182,9 @@ def face(
     n = len(points)
     for k in range(n):
         first, last = k, k
-        while first > 0 and joined[first - 1] and _apart(points, first, k) < FACE_M:
+        while first > 0 and joined[first - 1] and apart(points, first, k) < FACE_M:
             first -= 1
-        while last < n - 1 and joined[last] and _apart(points, last, k) < FACE_M:
+        while last < n - 1 and joined[last] and apart(points, last, k) < FACE_M:
             last += 1
         out[k] = 0
         if first == last:
@@ -217,7 +217,8 @@ def opposite(one: int, other: int) -> bool:
 
 
 @inner
-def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
+def apart(points: NDArray[np.float64], j: int, k: int) -> float:
+    """m, between two of the points."""
     dx, dy = points[j, 0] - points[k, 0], points[j, 1] - points[k, 1]
     return math.sqrt(dx * dx + dy * dy)
 

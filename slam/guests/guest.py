@@ -24,9 +24,8 @@ from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction, predict
-from slam.path import PosePath
-from slam.system import Estimate, Raster, told
-from slam.trajectory import Trajectory
+from slam.path import OnPath, PosePath
+from slam.system import Estimate, told
 
 SPACING_AT_M = 10.0  # m; there a voxel is as wide as two beams are apart
 LEAST_VOXEL_M = 0.10  # m
@@ -130,7 +129,7 @@ def needed(module: str, package: str, extra: str = "guests") -> ModuleType:
         ) from error
 
 
-class Guest(ABC):
+class Guest(OnPath, ABC):
     """A SLAM from outside behind this project's protocol.
 
     It gets each scan's end points, de-skewed by odometry as "shunting" gets them, and odometry's
@@ -185,11 +184,3 @@ class Guest(ABC):
     @abstractmethod
     def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
         """T_map_robot (3,) of a scan whose end points are (n, 2), and numbers to report."""
-
-    def map(self) -> Raster | None:
-        """None: a guest's map is its own affair."""
-        return None
-
-    def trajectory(self) -> Trajectory:
-        """The online poses."""
-        return self._path.trajectory()

@@ -144,7 +144,11 @@ class _Builder:
                 if isinstance(o, OdometryObject):
                     pose = self._checked(o.number, o.pose)
                     odom.append(PoseMessage(line=o.number, stamp_ns=o.stamp_ns, pose=pose))
-        turned = self._flags_are_turned()
+        # whether valid beams are marked invalid, as the first carmen2rawlog did
+        turned = not any(
+            (scan.valid & (scan.ranges > 0.0) & (scan.ranges < scan.range_max)).any()
+            for scan in self._scans
+        )
         return ScanLog(
             path=self._path,
             message=SCAN,
@@ -195,13 +199,6 @@ class _Builder:
                     out[item.number] = self._checked(item.number, before.pose)
             before = item
         return out if all(scan.number in out for scan in self._scans) else None
-
-    def _flags_are_turned(self) -> bool:
-        """Whether valid beams are marked invalid, as the first carmen2rawlog did."""
-        return not any(
-            (scan.valid & (scan.ranges > 0.0) & (scan.ranges < scan.range_max)).any()
-            for scan in self._scans
-        )
 
     def _scan(self, scan: ScanObject, robot: Pose | None, turned: bool) -> LaserMessage:
         if not (scan.range_max > 0.0 and 0.0 < scan.aperture <= 2.0 * math.tau):

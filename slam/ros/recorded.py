@@ -11,10 +11,9 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Frame
 from slam.logs.bag_topics import INCREMENT, TRANSFORMS, Bag
 from slam.logs.text import about
-from slam.path import PosePath
+from slam.path import OnPath, PosePath
 from slam.ros.messages import MAP, ODOM
 from slam.ros.node import StampedPose, Statements, pose_of, transform_of
-from slam.trajectory import Trajectory
 
 APART_S = 60.0  # no stamp of the stack so near to any of the scans: its clock is another one
 
@@ -69,7 +68,7 @@ def aligned(
     return moved
 
 
-class RecordedSlam:
+class RecordedSlam(OnPath):
     """A stack's statements as estimates of the frames that it saw, as if it said them now.
 
     statements  by the clock of the frames
@@ -102,10 +101,3 @@ class RecordedSlam:
     def processor_s(self) -> float:
         """Not a number: a bag does not say what the stack needed."""
         return math.nan
-
-    def map(self) -> None:
-        """None: it is not read from the bag."""
-
-    def trajectory(self) -> Trajectory:
-        """The online poses."""
-        return self._path.trajectory()

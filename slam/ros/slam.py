@@ -29,14 +29,13 @@ from slam.frames import Frame
 from slam.guests.pipe import Limits
 from slam.guests.wire import Guard, started
 from slam.names import child_environment
-from slam.path import PosePath
+from slam.path import OnPath, PosePath
 from slam.ros.link import MOST_DOMAIN, Link, domain_of_environment, open_link, open_to_others
 from slam.ros.messages import MAP, ODOM
 from slam.ros.node import Node
 from slam.ros.robot import Robot
 from slam.ros.template import said_ns
 from slam.system import register_prefix
-from slam.trajectory import Trajectory
 
 ROUTER = 7447  # port of rmw_zenohd
 LEASE_S = 15.0  # s; DDS takes an ended node for alive for 10 s, and a scan sent meanwhile is lost
@@ -104,7 +103,7 @@ ANSWER_S = 1.0  # that a scan's answer is waited for, wall clock: a node may ski
 
 
 @register_prefix("ros2:")
-class Ros2Slam:
+class Ros2Slam(OnPath):
     """A ROS 2 node over DDS: the one that is there, or that a command starts.
 
     command  words as a shell would split them (no shell runs it), "" for a node that runs already
@@ -167,10 +166,6 @@ class Ros2Slam:
     def map(self) -> Raster | None:
         """What it says on /map, None where it does not."""
         return None if self._other is None else self._other.node.map()
-
-    def trajectory(self) -> Trajectory:
-        """The online poses: a node states no others."""
-        return self._path.trajectory()
 
     def processor_s(self) -> float:
         """Time waited for its answers, wall clock, s: its processor time is not known here."""

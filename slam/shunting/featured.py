@@ -34,9 +34,8 @@ from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.landmarks.association import ipjc
 from slam.landmarks.filter import EkfFilter
-from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.peaks import Peaks, peaks
-from slam.shunting.slam import ShuntingSlam
+from slam.shunting.slam import ShuntingConfig, ShuntingSlam
 from slam.system import Estimate, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.matcher import Match, seen_by
@@ -128,7 +127,13 @@ class FeaturedShuntingSlam(ShuntingSlam):
             return super()._match(observations, prediction, cell_map)
         pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
         if self.config.objective == "log":
-            return self._climbed(pulling, agreed, prediction)
+            # Eq. (13) as printed, from where the pairs lead: the sum of the logarithms of overlaps
+            match = self._matcher.climb(
+                self.network, pulling, agreed.T_map_robot, prediction.T_map_robot,
+                inverted(prediction.prior),
+            )  # fmt: skip
+            matched = match.matched * float(agreed.accepted.mean())
+            return dataclasses.replace(match, matched=matched, overlapped=matched, searched=True)
         score, *_ = evaluate(
             self.network.cells, self._matcher.reward, seen_by(pulling), agreed.T_map_robot,
             np.zeros(3), np.zeros(3), np.zeros((3, 3)),
@@ -142,15 +147,6 @@ class FeaturedShuntingSlam(ShuntingSlam):
             tau=1.0,
             searched=True,
         )
-
-    def _climbed(self, pulling: Observations, agreed: _Agreed, prediction: Prediction) -> Match:
-        """Eq. (13) as printed, from where the pairs lead: the sum of the logarithms of overlaps."""
-        match = self._matcher.climb(
-            self.network, pulling, agreed.T_map_robot, prediction.T_map_robot,
-            inverted(prediction.prior),
-        )  # fmt: skip
-        matched = match.matched * float(agreed.accepted.mean())
-        return dataclasses.replace(match, matched=matched, overlapped=matched, searched=True)
 
     def _agreed(self, observations: Observations, prediction: Prediction) -> _Agreed:
         """IPJC between features and peaks, those looked at more than once first, as in a filter

@@ -18,7 +18,7 @@ from slam.errors import InvalidValueError
 from slam.frames import Float, Frame, Odometry
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction, predict
-from slam.shunting.config import ShuntingConfig
+from slam.shunting.slam import ShuntingConfig
 
 FRONT_END = ShuntingConfig.paper()  # how beams become Gaussians: de-skew, surfaces, view; ours
 CELL = 0.03  # m, edge of a neuron's square; ours

@@ -3,14 +3,20 @@
 
 from __future__ import annotations
 
+from dataclasses import dataclass
 from typing import ClassVar
 
 from slam.estimate import Changes, Raster
-from slam.shunting.config import ShuntingConfig
 from slam.shunting.map import export
 from slam.shunting.map.network import Network
 from slam.system import register
+from slam.tracker.config import TrackerConfig
 from slam.tracker.tracker import Tracker
+
+
+@dataclass(frozen=True, kw_only=True)
+class ShuntingConfig(TrackerConfig):
+    """As ``TrackerConfig``; ``robust()`` is the default, ``paper()`` the paper as printed."""
 
 
 @register("shunting")

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import abc
-import math
 from collections.abc import Mapping
 from dataclasses import replace
 from functools import partial
@@ -28,12 +27,9 @@ from slam.tracker.belief.status import State, Status
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
-from slam.tracker.matching.usual import Usual
 from slam.tracker.rasterise import rasterise
-from slam.tracker.standing.agreement import Agreement
 from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
-from slam.tracker.tracking.scan_matching import ScanMatching
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 from slam.tracker.uncertainty.residuals import Evidence, look
@@ -63,21 +59,14 @@ class Tracker(abc.ABC):
         self.cell_map = self._new_map(self.config)
         self._matcher = Matcher(self.config)
         self._before: Odometry | None = None
-        self._resumed: Float | None = None
         self._T_map_robot: Float = np.zeros(3)
-        self._numbers = self.config.tracking
         self._pose_covariance = PoseCovariance(self.config)
         self._odometry_noise = OdometryNoise.of_beams(self.config)
-        self._usual = Usual(self.config.matching.usual)
-        self._matching = ScanMatching(self.config, self._matcher, self._usual)
-        self._agreement = Agreement(self.config.standing)
-        self._belief = Belief(self.config, self._matcher, self._match, self._usual, self._agreement)
+        self._standing = Standing(self.config.standing)
+        usual, agreement = self._matcher.usual, self._standing.agreement
+        self._belief = Belief(self.config, self._matcher, self._match, usual, agreement)
         new_map = partial(self._new_map, self.config) if self.map_moves else None
         self._loops = Loops(self.config, self._matcher, self._new_submap, new_map)
-        self._T_map_odom, self._corrected_by = np.zeros(3), np.zeros(3)
-        self._held = False  # the map
-        self._standing = Standing(self.config.standing)
-        self._vote, self._dragged = 1.0, 0.0
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
 
@@ -97,7 +86,7 @@ class Tracker(abc.ABC):
         and pose then; ``diagnostics`` say so: "correction" and "T_map_odom" (docs/loops.md).
         Not converged while frozen, lost, or blind: a scan without a single return.
         """
-        if self._before is None and self._resumed is None:
+        if self._before is None and self._pose_covariance.loaded is None:
             return self._first(frame)
         self._path.check_order(frame.stamp_ns)
         self._correct()
@@ -106,16 +95,15 @@ class Tracker(abc.ABC):
         observations = self._standing.with_votes(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
-        self._vote = observations.mean_vote
         judged = self._judge(observations, prediction)  # 3 Eq. (13), and whether it is believed
         evidence = self._compare(observations, judged)  # 4 residuals
         self._update_map(observations, judged)  # 5 Eq. (8)
-        self._update_uncertainty(observations, judged, evidence)  # 6 pose, odometry noise
+        trust = self._update_uncertainty(observations, judged, evidence)  # 6 pose, odometry noise
         self._add_to_path(observations, judged)  # 7 key frames for loops
         match, state = judged.match, judged.state
         if state is State.TRACKING or not self._belief.certain:
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
-        return self._report(frame, match, state, judged.likeliest)
+        return self._report(frame, match, state, trust, judged.likeliest)
 
     def _first(self, frame: Frame) -> Estimate:
         twist = frame.odometry.twist
@@ -135,38 +123,32 @@ class Tracker(abc.ABC):
 
         Not while the robot is searched for, which takes the time of a scan.
         """
-        self._corrected_by = np.zeros(3)
+        self._path.moved_by = np.zeros(3)
         if not self._belief.certain:
             return
         error = self._loops.map_error(len(self._path) - 1)
         if error is not None:
             self._pose_covariance.known(error)
         self._loops.work()
-        if not self._trusted or self._held or self._resumed is not None:
+        if not self._trusted:
             return
         correction = self._loops.correction(self._path.poses)
         if correction is None:
             return
-        self.cell_map = correction.cell_map
-        before, T = self._T_map_robot, correction.T_new_old
-        self._T_map_robot = se2.compose(T, before)
-        self._T_map_odom = se2.compose(T, self._T_map_odom)
-        self._corrected_by = self._T_map_robot - before
-        self._corrected_by[2] = se2.wrap(float(self._corrected_by[2]))
-        self._path.replace(correction.poses)
-        self._standing.moved(T)
-        self._pose_covariance.turned(float(T[2]))
-        self._agreement.forget()
+        self.cell_map, T_new_old = correction.cell_map, correction.T_new_old
+        self._T_map_robot = self._path.correct(correction.poses, T_new_old, self._T_map_robot)
+        self._standing.moved(T_new_old)
+        self._pose_covariance.turned(float(T_new_old[2]))
 
     def _predict(self, odometry: Odometry) -> Prediction:
         """By odometry; on the first frame with a loaded map, where the robot was before."""
         if self._before is not None:
             return self._odometry_noise.predict(self._T_map_robot, self._before, odometry)
-        assert self._resumed is not None
+        assert self._pose_covariance.loaded is not None
         return Prediction(
             T_map_robot=self._T_map_robot,
             increment=np.zeros(3),
-            covariance=self._resumed,
+            covariance=self._pose_covariance.loaded,
             twist=np.zeros(3) if odometry.twist is None else np.asarray(odometry.twist),
             elapsed=self.config.map.resumed_look_s,
         )
@@ -177,20 +159,21 @@ class Tracker(abc.ABC):
         The prior is wider where enough is in view to correct what odometry alone gave for the pose
         before.
         """
-        if observations.weight >= self._numbers.relocalise.least_weight:
+        relocalise = self.config.tracking.relocalise
+        if observations.weight >= relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
         judged = self._belief.judge(self.cell_map, self._T_map_robot, observations, prediction)
         self.cell_map = judged.cell_map
         if judged.state is State.RELOCATED:
-            self._pose_covariance.relocated(coarse(self._numbers.relocalise))
+            self._pose_covariance.relocated(coarse(relocalise))
         return judged
 
     def _match(
         self, observations: Observations, prediction: Prediction, cell_map: CellMap
     ) -> Match:
         """By scan matching, to the map or to a copy of it."""
-        return self._matching.match(cell_map, observations, prediction)
+        return self._matcher.match(cell_map, observations, prediction)
 
     def _compare(self, observations: Observations, judged: Judged) -> Evidence | None:
         """What the observed surfaces say about the pose, before the map takes them in."""
@@ -205,32 +188,34 @@ class Tracker(abc.ABC):
         """Let the map see the frame, where the pose is believed."""
         if not judged.writes:
             return
-        match, elapsed = judged.match, judged.prediction.elapsed
-        rasterise(self.cell_map, observations, match.T_map_robot)
-        T_map_laser = se2.compose(match.T_map_robot, observations.T_robot_laser)
-        step = min(elapsed, self.config.map.longest_look_s)
+        T_map_robot = judged.match.T_map_robot
+        rasterise(self.cell_map, observations, T_map_robot)
+        T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
+        step = min(judged.prediction.elapsed, self.config.map.longest_look_s)
         seen = self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
         if judged.state is State.TRACKING:
             self._belief.learn(observations, judged, seen)
 
     def _update_uncertainty(
         self, observations: Observations, judged: Judged, evidence: Evidence | None
-    ) -> None:
+    ) -> float:
+        """Returns how far the matched returns are trusted, in [0, 1]."""
         match, prediction = judged.match, judged.prediction
-        tracked = judged.state is State.TRACKING and not match.slipped
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
-        self._dragged = 0.0 if match.slipped else self._agreement.dragged(self._vote)
+        agreement, dragged = self._standing.agreement, 0.0
         if match.slipped:  # found by a search, among what does not fit there
-            found = (1.0 - match.overlapped) * coarse(self._numbers.relocalise)
+            found = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
             self._pose_covariance.dragged(found)
         else:
-            left_behind = self._agreement.left_behind(self._dragged)
-            self._pose_covariance.dragged(left_behind, self._agreement.covariance(self._dragged))
-        if tracked:
+            dragged = agreement.dragged(observations.mean_vote)
+            left_behind = agreement.left_behind(dragged)
+            self._pose_covariance.dragged(left_behind, agreement.covariance(dragged))
+        if judged.state is State.TRACKING and not match.slipped:
             sigma_m, along_rad = observations.sensor_sigma_m, self._pose_covariance.along_rad
             self._odometry_noise.learn(prediction, match, sigma_m, along_rad)
         else:
-            self._odometry_noise.skip()
+            self._odometry_noise.nis = None
+        return observations.mean_vote * (1.0 - dragged)
 
     def _add_to_path(self, observations: Observations, judged: Judged) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is uncertain."""
@@ -241,7 +226,7 @@ class Tracker(abc.ABC):
         if found:  # carried away, or odometry was right: loops decide
             off = match.T_map_robot - prediction.T_map_robot
             off[2] = se2.wrap(float(off[2]))
-            covariance = prediction.covariance + coarse(self._numbers.relocalise)
+            covariance = prediction.covariance + coarse(self.config.tracking.relocalise)
             covariance = covariance + np.diag(off * off)
         elif state is not State.TRACKING and judged.followed:
             covariance = prediction.covariance  # matched to the scans before, if not to the map
@@ -256,49 +241,40 @@ class Tracker(abc.ABC):
         )  # fmt: skip
 
     def _report(
-        self, frame: Frame, match: Match, state: State, elsewhere: Float | None = None
-    ) -> Estimate:
+        self, frame: Frame, match: Match, state: State, trust: float = 1.0,
+        elsewhere: Float | None = None,
+    ) -> Estimate:  # fmt: skip
+        """At the likeliest place, with the covariance of all places where the robot may be."""
+        sure, belief = self._pose_covariance, self._belief
         self._before, self._T_map_robot = frame.odometry, match.T_map_robot
         T_map_robot = match.T_map_robot if elsewhere is None else elsewhere
-        p_lost = 1.0 - (1.0 - self._belief.p_lost) * (1.0 - self._p_off())
-        sees = self._belief.status is not Status.BLIND
-        status = Status.LOST if p_lost >= 0.5 and sees else self._belief.status
+        alert_m = self.config.standing.alert_m
+        p_lost = 1.0 - (1.0 - belief.p_lost) * (1.0 - sure.p_off(alert_m))
+        lost = p_lost >= 0.5 and belief.status is not Status.BLIND
+        doubtful = 0.0 < alert_m < 3.0 * sure.by_movers_m
         self._path.add(frame.stamp_ns, match.T_map_robot, elsewhere)
+        covariance = sure.covariance + belief.spread_about(T_map_robot, self._loops.anywhere)
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=T_map_robot,
-            covariance=self._covariance(T_map_robot),
-            converged=state in (State.TRACKING, State.RELOCATED) and not self._doubtful(),
+            covariance=covariance,
+            converged=state in (State.TRACKING, State.RELOCATED) and not doubtful,
             diagnostics={
                 "state": state.value,
                 "matched": match.matched,
                 "searched": match.searched,
                 "evaluations": match.evaluations,
-                "unobservable": self._pose_covariance.unobservable,
-                "unobservable_rad": self._pose_covariance.along_rad,
+                "unobservable": sure.unobservable,
+                "unobservable_rad": sure.along_rad,
                 "nis": self._odometry_noise.nis,
-                "trust": self._vote * (1.0 - self._dragged),
-                "odometry_ratio": self._agreement.ratio,
-                "verdict": status.value,
+                "trust": trust,
+                "odometry_ratio": self._standing.agreement.ratio,
+                "verdict": (Status.LOST if lost else belief.status).value,
                 "p_lost": p_lost,
-                "correction": self._corrected_by.tolist(),
-                "T_map_odom": self._T_map_odom.tolist(),
+                "correction": self._path.moved_by.tolist(),
+                "T_map_odom": self._path.T_map_odom.tolist(),
             },
         )
-
-    def _covariance(self, T_map_robot: Float) -> Float:
-        """(3, 3) of the pose: that of the mixture of all places where the robot may be."""
-        covariance = self._pose_covariance.covariance
-        return covariance + self._belief.spread_about(T_map_robot, self._loops.anywhere)
-
-    def _p_off(self) -> float:
-        """Probability that movers carried map and robot off by more than the limit (Rayleigh)."""
-        alert_m, by_m = self.config.standing.alert_m, self._pose_covariance.by_movers_m
-        return math.exp(-((alert_m / by_m) ** 2)) if min(alert_m, by_m) > 0.0 else 0.0
-
-    def _doubtful(self) -> bool:
-        """Whether three times that deviation is beyond the limit."""
-        return 0.0 < self.config.standing.alert_m < 3.0 * self._pose_covariance.by_movers_m
 
     def displace(self, by: Float) -> None:
         """For experiments: from now on the pose is believed to be off by ``by`` (3,), map frame.
@@ -320,13 +296,14 @@ class Tracker(abc.ABC):
 
         For a map that was loaded: odometry and clock begin anew.
         """
-        self._T_map_robot, self._resumed, self._before = T_map_robot, covariance, None
-        self._pose_covariance.resumed(covariance)
+        self._T_map_robot, self._before = T_map_robot, None
+        self._pose_covariance.resumed(covariance, covariance)
+        self._loops.hold()
 
     @property
     def usual_match(self) -> float:
         """Median share of a scan that matched the map."""
-        return self._usual.match
+        return self._matcher.usual.match
 
     def matched(self, observations: Observations, T_map_robot: Float, covariance: Float) -> Match:
         """The match to the map as it is, from this pose on, off by as much as that."""
@@ -343,7 +320,7 @@ class Tracker(abc.ABC):
             kind=type(self).__name__,
             T_map_robot=self._T_map_robot,
             covariance=self._pose_covariance.covariance,
-            usual=tuple(self._usual.matches),
+            usual=tuple(self._matcher.usual.matches),
         )
         memory.save(path, self.cell_map, state, extra)
 
@@ -366,14 +343,14 @@ class Tracker(abc.ABC):
         except InvalidValueError as error:  # blocks farther apart than a map can be
             raise LogFormatError(path, str(error)) from error
         slam._T_map_robot = state.T_map_robot
-        slam._resumed = state.covariance + coarse(config.tracking.relocalise)
-        slam._pose_covariance.resumed(state.covariance)
-        slam._usual.matches.extend(state.usual)
+        loaded = state.covariance + coarse(config.tracking.relocalise)
+        slam._pose_covariance.resumed(state.covariance, loaded)
+        slam._loops.hold()
+        slam._matcher.usual.matches.extend(state.usual)
         return slam
 
     def hold_map(self) -> None:
         """The map is a frame of reference from now on: closed loops do not move it."""
-        self._held = True
         self._loops.hold()
 
     def poses_in_map(self) -> Float:

@@ -31,6 +31,7 @@ from slam.maps import read_map
 from slam.names import NameFromFile
 from slam.shunting import ShuntingSlam
 from tests.hostile.folders import SCENE, SLAM, Hostile
+from tests.processes import python
 
 REPO = Path(__file__).resolve().parents[2]
 STRIP = ["--strip", "s.png", "--at", "0.1"]
@@ -253,11 +254,7 @@ def in_process(hostile: Hostile, *words: str, **environment: str) -> subprocess.
     start = hostile.path.parent / "bin" / "mobilia"
     start.parent.mkdir(exist_ok=True)
     start.write_text("from scripts.__main__ import main\nmain()\n")
-    return subprocess.run(
-        [sys.executable, start, *words], cwd=hostile.path, capture_output=True, text=True,
-        check=False, timeout=240,
-        env={**os.environ, "PYTHONPATH": str(REPO), "COLUMNS": "200", **environment},
-    )  # fmt: skip
+    return python(start, *words, cwd=hostile.path, check=False, **environment)
 
 
 def test_modules_of_the_working_folder_stay_out_of_command_and_workers(hostile: Hostile):

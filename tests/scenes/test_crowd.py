@@ -5,7 +5,6 @@ from __future__ import annotations
 
 from dataclasses import fields
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -18,6 +17,7 @@ from scenes.scene import Scene
 from sim.simulation import Simulation, tour
 from slam.errors import InvalidValueError
 from slam.frames import BeamClass
+from tests.built_scenes import placed
 
 MIXED = "escorts:4,boards:1,couches:1,cleaners:1,groups:4,queue:3"
 
@@ -115,10 +115,7 @@ def test_streams_go_between_the_far_ends():
 def test_no_corner_of_what_is_long_stands_in_a_wall(crowd: str):
     for seed in range(1, 9):
         scene = build("gallery", seed=seed, crowd=crowd)
-        model = scene.compile()
-        data = mujoco.MjData(model)
-        scene.place(model, data)
-        mujoco.mj_forward(model, data)
+        model, data = placed(scene)
         hull = [model.geom(g).name.partition("/")[2].startswith("hull") for g in range(model.ngeom)]
         deep = [float(c.dist) for c in data.contact if hull[c.geom[0]] or hull[c.geom[1]]]
         assert min(deep, default=0.0) >= 0.0, seed

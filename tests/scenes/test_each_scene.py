@@ -11,7 +11,7 @@ import pytest
 
 import scenes
 from slam.errors import InvalidValueError
-from tests.built_scenes import built, reached
+from tests.built_scenes import built, placed, reached
 
 
 def test_arena_has_only_chairs_by_default():
@@ -33,10 +33,7 @@ def test_office_has_rooms_doors_people_and_both_kinds_of_chairs():
 @pytest.mark.parametrize("walls", ["visible", "none"])
 def test_walls_nobody_sees_still_hold_the_chairs(walls):
     scene = scenes.build("arena", 4, walls=walls)
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    scene.place(model, data)
-    mujoco.mj_forward(model, data)
+    model, data = placed(scene)
     groups = np.array([1, 1, 1, 0, 1, 1], dtype=np.uint8)  # what a scanner meets
     hit, seen = np.zeros(1, dtype=np.int32), set()
     robot = model.body("robot/base").id
@@ -59,9 +56,7 @@ def test_walls_nobody_sees_still_hold_the_chairs(walls):
 def test_what_has_a_back_stays_out_from_under_a_desk(name, under):
     """Shoved at a desk's user side: a chair's back would stick through the top."""
     scene = scenes.build("office", 1, n_chairs=3, n_people=0)
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    scene.place(model, data)
+    model, data = placed(scene)
     desk = model.body("desk0/base").id
     mujoco.mj_kinematics(model, data)
     to_desk = data.xmat[desk].reshape(3, 3)[:, 1]  # its user sits at -y
@@ -111,9 +106,7 @@ def test_doors_rest_as_asked_for(name):
 
 def test_a_closed_door_stays_shut_by_its_closer():
     scene = scenes.build("office", 0, n_people=0, n_chairs=0, doors="closed")
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    scene.place(model, data)
+    model, data = placed(scene)
     door = int(model.joint("door0/hinge").qposadr[0])
     data.qpos[door] = 1.0
     for _ in range(3000):
@@ -149,9 +142,7 @@ def test_a_warehouse_has_what_was_asked_for_and_it_can_be_moved():
     scene = scenes.build("warehouse", 2, n_trolleys=3, n_pallets=5)
     kinds = [m.kind for m in scene.movers]
     assert (kinds.count("trolley"), kinds.count("pallet")) == (3, 5)
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    scene.place(model, data)
+    model, data = placed(scene)
     for name, force in (("trolley0", 60.0), ("pallet0", 200.0)):
         start = data.qpos[model.joint(f"{name}/x").qposadr[0]]
         dof = model.joint(f"{name}/x").dofadr[0]

@@ -14,6 +14,7 @@ import scenes.assembly
 from scenes import look
 from scenes.kinds import KINDS
 from scenes.placement import Floor, gap_to_boxes
+from tests.built_scenes import placed
 
 PARTS = sorted((Path(scenes.assembly.__file__).parent / "parts").glob("*.xml"))
 PLANAR = ("chair_swivel", "chair_visitor", "bin", "trolley", "pallet", "person", "robot")
@@ -68,10 +69,7 @@ def test_no_corner_of_a_long_part_sticks_out_of_its_hulls(kind):
 
 def test_long_things_are_put_where_all_their_hulls_have_room():
     scene = scenes.filled("arena", 4, loads=dict.fromkeys(LONG, 2))
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    scene.place(model, data)
-    mujoco.mj_forward(model, data)
+    _, data = placed(scene)
     assert data.ncon == 0
     assert sum(mover.kind in LONG for mover in scene.movers) == 2 * len(LONG)
 

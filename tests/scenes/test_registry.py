@@ -4,15 +4,13 @@
 from __future__ import annotations
 
 import hashlib
-import subprocess
-import sys
-from pathlib import Path
 
 import pytest
 
 import scenes
 from slam.errors import InvalidValueError, UnknownNameError
 from tests.built_scenes import NAMES, built, model_bytes
+from tests.processes import python
 
 
 @pytest.mark.parametrize(
@@ -117,14 +115,7 @@ for name in reversed(NAMES):
 
 
 def test_another_process_builds_the_same_bytes_whatever_it_built_before():
-    run = subprocess.run(
-        [sys.executable, "-c", ELSEWHERE],
-        capture_output=True,
-        text=True,
-        check=True,
-        timeout=120,
-        cwd=Path(__file__).parents[2],
-    )
+    run = python("-c", ELSEWHERE)
     theirs = dict(line.split() for line in run.stdout.splitlines())
     ours = {name: hashlib.sha256(model_bytes(scenes.build(name, 7))).hexdigest() for name in NAMES}
     assert theirs == ours

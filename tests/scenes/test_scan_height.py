@@ -17,7 +17,7 @@ from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 from sim.world.world import World
 from slam.errors import InvalidValueError
-from tests.built_scenes import built
+from tests.built_scenes import built, placed
 
 AWAY = 1.5  # m from the laser to the middle of the chair
 
@@ -69,10 +69,7 @@ def test_a_chair_shows_what_it_has_at_that_height(kind, height, number, width):
 def test_laser_and_true_map_are_at_that_height(name, height):
     """The raster says occupied where a beam along the scan plane meets what never moves."""
     scene = scenes.build(name, 0, scan_height_m=height)
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    scene.place(model, data)
-    mujoco.mj_forward(model, data)
+    model, data = placed(scene)
     assert data.site(LASER).xpos[2] == pytest.approx(height)
     raster = scene.static_map
     hit, groups = np.zeros(1, dtype=np.int32), np.array([1, 1, 0, 0, 0, 0], dtype=np.uint8)

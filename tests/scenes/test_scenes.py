@@ -14,7 +14,7 @@ import pytest
 
 import scenes
 from scenes.placement import gap_to_boxes
-from tests.built_scenes import NAMES, built, in_view, model_bytes, model_of, reached
+from tests.built_scenes import NAMES, built, in_view, model_bytes, model_of, placed, reached
 
 SEEDS = range(6)
 GOAL_TO_DOOR = 1.2
@@ -117,12 +117,7 @@ class TestLayouts:
 
     @pytest.mark.parametrize("seed", [0, 5])
     def test_the_engine_sees_no_contact_at_the_start(self, name, seed):
-        scene = built(name, seed)
-        model = scene.compile()
-        data = mujoco.MjData(model)
-        scene.place(model, data)
-        mujoco.mj_forward(model, data)
-        assert data.ncon == 0
+        assert placed(built(name, seed))[1].ncon == 0
 
     def test_the_seed_and_only_the_seed_decides_a_scene(self, name):
         same, again, other = (scenes.build(name, seed) for seed in (7, 7, 8))

@@ -4,13 +4,12 @@
 from __future__ import annotations
 
 import importlib
-import subprocess
-import sys
 
 import pytest
 
 from scenes import registry
 from slam import system
+from tests.processes import python
 
 SLOW = ("mujoco", "numba", "matplotlib", "scipy", "cv2", "rosbags", "joblib")
 _PROBE = """
@@ -39,10 +38,7 @@ print("loaded:", *sorted({name.partition(".")[0] for name in sys.modules}))
     ],
 )
 def test_what_simulates_nothing_loads_no_simulator(words, said, tmp_path):
-    ran = subprocess.run(
-        [sys.executable, "-c", _PROBE, *words.split()],
-        capture_output=True, text=True, check=True, cwd=tmp_path, timeout=120,
-    )  # fmt: skip
+    ran = python("-c", _PROBE, *words.split(), cwd=tmp_path)
     answer, _, loaded = ran.stdout.rpartition("loaded:")
     assert said in answer + ran.stderr
     assert "ended with" in answer

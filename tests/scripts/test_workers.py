@@ -18,7 +18,7 @@ from scripts.jobs import Job, run_jobs
 from slam import locks
 from slam.errors import MobiliaError, OutputError
 from slam.guests.wire import Wire
-from tests.processes import processes_with
+from tests.processes import processes_with, python
 
 REPO = Path(__file__).resolve().parents[2]
 MARK = "MOBILIA_TEST_WORKERS"
@@ -124,9 +124,7 @@ def test_what_the_tracker_of_semaphores_finds_left_over_goes_without_a_word():
         "from joblib.externals.loky.backend import resource_tracker\n"
         "resource_tracker.register('/loky-1-nothing', 'semlock')\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], cwd=REPO, capture_output=True, text=True, check=False
-    )
+    done = python("-c", code)
     assert (done.returncode, done.stdout, done.stderr) == (0, "", "")
 
 
@@ -145,10 +143,6 @@ def test_a_worker_that_is_replaced_is_not_the_users_business():
         "assert sorted(workers.each(grows, range(8), jobs=2)) == list(range(8))\n"
         "import warnings; warnings.warn('another', UserWarning)"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code], capture_output=True, text=True, check=False, timeout=120,
-        cwd=REPO, env={**os.environ, "PYTHONPATH": str(REPO)},
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = python("-c", code)
     assert "A worker stopped" not in done.stderr
     assert "UserWarning: another" in done.stderr

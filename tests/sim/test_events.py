@@ -14,7 +14,8 @@ from scenes.scene import Mover
 from sim.events import CHAIR, CHANGE, DOOR, KIDNAP, NEAR_M, PERSON, Event, EventWatch
 from sim.moments import Moment, toured
 from sim.simulation import Simulation
-from slam.frames import BeamLabels, Frame, LaserSpec, Odometry, Scan
+from slam.frames import BeamLabels, LaserSpec
+from tests.world2d import frame_at
 
 MOVERS = [("chair0", "chair_swivel", 0.3), ("door0", "door", 0.9), ("someone", "person_coat", 0.25),
           ("robot", "robot", 0.25)]  # fmt: skip
@@ -44,13 +45,8 @@ def moments(
             body=np.array(hit, np.int32), kind=np.ones(2, np.uint8), displacement=np.zeros(2),
             incidence=np.zeros(2), mixed=np.zeros(2, bool),
         )  # fmt: skip
-        frame = Frame(
-            stamp_ns=stamp,
-            odometry=Odometry(stamp_ns=stamp, T_odom_robot=np.zeros(3)),
-            scan=Scan(stamp_ns=stamp, ranges=np.ones(2, np.float32), spec=SPEC),
-            truth=np.array([robot, 0.0, 0.0]),
-            labels=labels,
-        )
+        truth = np.array([robot, 0.0, 0.0])
+        frame = frame_at(stamp, ranges=np.ones(2), spec=SPEC, truth=truth, labels=labels)
         made.note(Moment(frame=frame, poses=poses, moving=moving))
     return made
 

@@ -7,10 +7,10 @@ import numba
 import numpy as np
 import pytest
 
-from slam import _jit, _linking
+from slam import _jit, _numba
 
 
-@pytest.mark.skipif(numba.version_info.short != _linking.TRIED, reason="another Numba")
+@pytest.mark.skipif(numba.version_info.short != _numba.TRIED, reason="another Numba")
 def test_only_what_python_enters_is_made_executable():
     @_jit.inner
     def lowest(x: float) -> float:

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -18,6 +17,7 @@ from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frames import Frame, LaserSpec, Odometry, Scan
 from slam.oracle_map import MapOracle
+from tests.world2d import frame_at
 
 CELL_M = 0.02
 SPEC = LaserSpec(n_beams=181, angle_min=-math.pi / 2, angle_increment=math.radians(1.0))
@@ -93,19 +93,14 @@ def test_a_pose_at_which_beams_pass_through_walls_is_looked_for_again(moved):
 
 def test_it_is_a_control_that_must_be_shown_the_map():
     oracle = slam.create("oracle(map)")
-    frame = Frame(
-        stamp_ns=0, odometry=Odometry(stamp_ns=0, T_odom_robot=np.zeros(3)),
-        scan=Scan(stamp_ns=0, ranges=np.ones(SPEC.n_beams, dtype=np.float32), spec=SPEC),
-    )  # fmt: skip
+    ones = np.ones(SPEC.n_beams)
+    frame = frame_at(0, ranges=ones, spec=SPEC)
     with pytest.raises(InvalidValueError, match=r"oracle\(map\) needs the true map"):
         oracle.update(frame)
     bare = Raster(values=np.zeros((9, 9), np.float32), resolution_m=0.02, T_map_origin=START)
     oracle.know(bare, START)
     oracle.update(frame)
-    moved = Odometry(stamp_ns=10**8, T_odom_robot=np.array([0.1, 0.0, 0.0]))
-    said = oracle.update(
-        replace(frame, stamp_ns=10**8, odometry=moved, scan=replace(frame.scan, stamp_ns=10**8))
-    )
+    said = oracle.update(frame_at(10**8, (0.1, 0.0, 0.0), ones, SPEC))
     assert not said.converged  # no walls: odometry's
     assert said.T_map_robot.tolist() == [0.1, 0.0, 0.0]
     assert "map" not in slam.system.names()

@@ -12,22 +12,16 @@ import pytest
 
 from slam.errors import SlamFailedError
 from slam.estimate import Landmarks
-from slam.frames import Frame, Odometry
+from slam.frames import Frame
 from slam.odometry import OdometrySlam
 from slam.replay import Replay, Track
 from slam.system import Estimate, Raster, create
 from slam.trajectory import Trajectory
+from tests.world2d import frame_at
 
 
 def frames(n: int = 5) -> list[Frame]:
-    return [
-        Frame(
-            stamp_ns=k,
-            odometry=Odometry(stamp_ns=k, T_odom_robot=np.array([0.1 * k, 0.0, 0.0])),
-            truth=np.array([0.2 * k, 1.0, 0.0]),
-        )
-        for k in range(n)
-    ]
+    return [frame_at(k, (0.1 * k, 0.0, 0.0), truth=np.array([0.2 * k, 1.0, 0.0])) for k in range(n)]
 
 
 class Peeping:

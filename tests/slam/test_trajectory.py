@@ -104,5 +104,7 @@ def test_a_lost_robot_is_reported_elsewhere_and_its_motion_is_what_loops_correct
     assert path.poses().tolist() == [[1, 0, 0], [2, 0, 0]]
     assert path.reported().tolist() == [[1, 0, 0], [5, 5, 1]]
     corrected = path.poses() + np.array([0.0, 1.0, 0.0])
-    path.replace(corrected)
+    T_new_old, latest = np.array([0.0, 1.0, 0.0]), np.array([2.0, 0.0, 0.0])
+    assert path.correct(corrected, T_new_old, latest).tolist() == [2, 1, 0]
+    assert path.moved_by.tolist() == path.T_map_odom.tolist() == [0, 1, 0]
     assert path.reported().tolist() == path.poses().tolist() == corrected.tolist()

@@ -10,7 +10,6 @@ is refused.
 
 from __future__ import annotations
 
-import difflib
 import importlib
 import inspect
 import pkgutil
@@ -20,7 +19,7 @@ from functools import cache
 from typing import Any, ClassVar, Protocol, TypeVar, runtime_checkable
 
 from sim.sensors.lidar.scanner import ERRORS, Scanner
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.errors import InvalidValueError, UnknownNameError, meant
 from slam.frames import Float, LaserSpec
 
 DEFAULT = "lms221"
@@ -118,8 +117,7 @@ def model_of(name: str) -> Callable[..., ScannerConfig]:
     _load_own()
     if name in _models:
         return _models[name]
-    near = difflib.get_close_matches(name, [*_models, *ERRORS], n=1)
-    hint = f" Did you mean '{near[0]}'?" if near else ""
+    hint = meant(name, [*_models, *ERRORS])
     raise UnknownNameError(f"no scanner is called '{name}'.{hint} {_known()}")
 
 

@@ -3,12 +3,11 @@
 
 from __future__ import annotations
 
-import difflib
 import math
 from dataclasses import dataclass
 from types import MappingProxyType
 
-from slam.errors import UnknownNameError
+from slam.errors import UnknownNameError, meant
 from slam.settings import Settings, number
 
 
@@ -68,9 +67,8 @@ PRESETS = MappingProxyType(
 def preset(name: str) -> OdometryConfig:
     """A named ``OdometryConfig``; raises ``UnknownNameError`` with the near match."""
     if name not in PRESETS:
-        near = difflib.get_close_matches(name, PRESETS, n=1)
-        hint = f" Did you mean '{near[0]}'?" if near else ""
         raise UnknownNameError(
-            f"no odometry preset is called '{name}'.{hint} Known: {', '.join(PRESETS)}."
+            f"no odometry preset is called '{name}'.{meant(name, PRESETS)} "
+            f"Known: {', '.join(PRESETS)}."
         )
     return PRESETS[name]

@@ -111,14 +111,12 @@ def _straight(ranges: Float, angles: Float, beams: Int, split_m: float) -> Itera
         if (np.abs(own - line) * cosines)[ENDS:-ENDS].max() <= split_m:
             yield part
             continue
-        at = _farthest(own * np.cos(toward), own * np.sin(toward))
+        # of the inner points, the one farthest from the chord
+        x = own * np.cos(toward)
+        y = own * np.sin(toward)
+        across = (x - x[0]) * (y[-1] - y[0]) - (y - y[0]) * (x[-1] - x[0])
+        at = 1 + int(np.argmax(np.abs(across[1:-1])))
         waiting += [part[:at], part[at:]]
-
-
-def _farthest(x: Float, y: Float) -> int:
-    """Of the inner points, the one farthest from the chord."""
-    across = (x - x[0]) * (y[-1] - y[0]) - (y - y[0]) * (x[-1] - x[0])
-    return 1 + int(np.argmax(np.abs(across[1:-1])))
 
 
 def _line(ranges: Float, angles: Float) -> tuple[Float, Float]:

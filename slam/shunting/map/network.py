@@ -183,11 +183,18 @@ class Network(CellMap):
         reach = config.lateral_reach_cells
         self.mu = lateral_mu(config.lateral_sum, reach) if lateral else 0.0
 
-    def law(self, step: float) -> Law:
-        """Constants of an update whose input acts for ``step`` s (the time since the last scan)."""
-        numbers = self.config.map
-        pace = self.pace(step)
-        return Law(
+    def integrate(
+        self,
+        view: View,
+        T_map_laser: NDArray[np.float64],
+        step: float,
+        *,
+        write: bool,
+        counted: NDArray[np.uint8] = ANEW,
+    ) -> Look:
+        """Take the present impressions in for ``step`` s; see the kernel of the same name."""
+        numbers, pace = self.config.map, self.pace(step)
+        law = Law(
             step=step,
             look=step,
             pace=pace,
@@ -201,18 +208,6 @@ class Network(CellMap):
             unseen=numbers.unseen,
             known_s=numbers.known_s,
         )
-
-    def integrate(
-        self,
-        view: View,
-        T_map_laser: NDArray[np.float64],
-        step: float,
-        *,
-        write: bool,
-        counted: NDArray[np.uint8] = ANEW,
-    ) -> Look:
-        """Take the present impressions in for ``step`` s; see the kernel of the same name."""
-        law = self.law(step)
         result = integrate(self.cells, view, T_map_laser, self.cell, law, write, counted)
         if write:
             self.release()

@@ -17,11 +17,11 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
-from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
+from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.episode import Episode, second_moment
-from slam.tracker.belief.evidence import Evidence, vanished
+from slam.tracker.belief.evidence import vanished
 from slam.tracker.belief.places import Place, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State, Status
@@ -29,8 +29,7 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import Look
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.local_search import SearchWindow
-from slam.tracker.matching.matcher import Match, Matcher, unmatched
-from slam.tracker.matching.usual import Usual
+from slam.tracker.matching.matcher import Match, Matcher, Usual, near, unmatched
 from slam.tracker.standing.agreement import Agreement
 
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
@@ -76,6 +75,7 @@ class Belief:
         """
         self._agreement = agreement
         self._config, self._numbers = config.belief, config.tracking.relocalise
+        self._give_up_s = config.tracking.give_up_s
         self._matcher, self._match, self._usual = matcher, match, usual
         self._odds = Odds(config.belief, config.carried_per_h)
         self._episode: Episode | None = None
@@ -114,9 +114,6 @@ class Belief:
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
-        if self._odds.asked and self._is_dragged(cell_map, observations, match):
-            pose = self._agreement.undragged(match.T_map_robot, observations.mean_vote)
-            match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
         gone, now = 0.0, (self._latest, match.T_map_robot)
@@ -130,16 +127,6 @@ class Belief:
         episode.places.remember(self._latest)
         episode.write(observations, match.T_map_robot, prediction.elapsed)
         return self._decided(episode, cell_map, observations, match, prediction)
-
-    def _is_dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> bool:
-        """Whether movers rather carried the match than odometry errs: by it, and what is known."""
-        dragged = self._agreement.dragged(observations.mean_vote)
-        if dragged <= 0.5:
-            return False
-        poses = match.T_map_robot, self._agreement.put_back(match.T_map_robot)
-        looks = [Evidence().add(cell_map, observations, pose) for pose in poses]
-        here, back = probabilities([self._odds.evidence(look) for look in looks])
-        return dragged * back > (1.0 - dragged) * here
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
         """A scan without a return says nothing: odometry alone."""
@@ -335,10 +322,13 @@ class Belief:
     ) -> Judged:
         """Whether one place is certain: where motion led, or another; else wait."""
         weighed, sure = self._weighed, 1.0 - self._config.frozen_above
+        waited_enough = episode.elapsed_s > self._give_up_s
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = _same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
-            taken = goes_on and p >= sure
+            # the robot has left the map: no scan will tell more
+            left = waited_enough and place.evidence.latest_m < self._config.confirmed_m
+            taken = (goes_on and p >= sure) or (left and p >= 1.0 - LENIENT * (1.0 - sure))
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, observations, prediction)
         if 1.0 - self._p_off >= sure:
@@ -372,6 +362,7 @@ class Belief:
             )  # fmt: skip
         return Judged(
             match=place.match, prediction=prediction, state=State.RELOCATED, cell_map=cell_map,
+            writes=True,
         )  # fmt: skip
 
     def spread_about(self, T_map_robot: Float, anywhere: Callable[[Float], Float]) -> Float:
@@ -384,14 +375,6 @@ class Belief:
         spreads = second_moment(poses, shares, T_map_robot)
         # the places that are followed need not be all: who is lost may be anywhere
         return spreads + self.p_lost * anywhere(T_map_robot)
-
-
-def near(match: Match, prediction: Prediction) -> Match:
-    """The match, or odometry alone where rounding has carried it past all places and numbers."""
-    off = np.abs(match.T_map_robot - prediction.T_map_robot)
-    if off.max() <= odometry_steps.MOST_STEP_M and np.isfinite(match.information).all():
-        return match
-    return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
 
 
 def _same(one: Match, other: Match) -> bool:

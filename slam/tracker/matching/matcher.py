@@ -1,40 +1,99 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scan matching, Eq. (13): the pose whose observations overlap the map most, against the prior."""
+"""Scan matching, Eq. (13): the pose whose observations overlap the map most, against the prior.
+
+By what matches were like so far it is told which scans are worth a search.
+"""
 
 from __future__ import annotations
 
 import math
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from statistics import median
+from typing import NamedTuple
 
 import numpy as np
+from numpy.typing import NDArray
 
 from slam import se2
+from slam._jit import njit
 from slam.frames import Float
+from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import inverted, turned
+from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.tracker.belief.posterior import Odds
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
-from slam.tracker.matching.few import Widths, blur, room_for
+from slam.tracker.matching.config import UsualConfig
 from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import SCRATCH, Climb, Reward, Seen, refine
 
 
+class Widths(NamedTuple):
+    """Sums of two variances, m^2.
+
+    place  of the prior's position
+    least  a blur of no more is none
+    most   of the blur: it is shrunk to this
+    """
+
+    place: float
+    least: float
+    most: float
+
+
+@njit
+def blur(
+    seen: Seen, covariance: NDArray[np.float64], widths: Widths, every: int, out: Seen
+) -> bool:
+    """Fill ``out`` with one of ``every`` so many, smeared by a pose's (3, 3) ``covariance``.
+
+    That one is in the robot frame. False, and ``out`` is not to be used, where it smears none of
+    them by more than ``widths.least``.
+    """
+    xx, xy, xt = covariance[0, 0], covariance[0, 1], covariance[0, 2]
+    yy, yt, tt = covariance[1, 1], covariance[1, 2], covariance[2, 2]
+    farthest = 0.0
+    for k in range(len(seen.points)):
+        x, y = seen.points[k, 0], seen.points[k, 1]
+        farthest = max(farthest, x * x + y * y)
+    if 2.0 * (widths.place + farthest * tt) < widths.least:  # (a + b)^2 <= 2 (a^2 + b^2)
+        return False
+    blurred = False
+    for m in range(len(out.points)):
+        k = m * every
+        x, y = seen.points[k, 0], seen.points[k, 1]
+        ttx, tty = tt * x, tt * y
+        a = xx - 2.0 * xt * y + tty * y
+        b = xy + xt * x - yt * y - ttx * y
+        d = yy + 2.0 * yt * x + ttx * x
+        blurred |= a + d > widths.least
+        share = min(1.0, widths.most / max(a + d, 1e-12))
+        out.points[m, 0], out.points[m, 1] = x, y
+        out.covariances[m, 0] = seen.covariances[k, 0] + a * share
+        out.covariances[m, 1] = seen.covariances[k, 1] + b * share
+        out.covariances[m, 2] = seen.covariances[k, 2] + d * share
+        out.weights[m] = seen.weights[k] * every
+        out.tangents[m, 0], out.tangents[m, 1] = seen.tangents[k, 0], seen.tangents[k, 1]
+        out.facings[m], out.votes[m] = seen.facings[k], seen.votes[k]
+    return blurred
+
+
+LEAST = 1e-9  # shares are divided by the usual one
+
+
 def seen_by(observations: Observations) -> Seen:
-    """The arrays of ``observations``."""
+    """The arrays of ``observations``; all votes are 1 where nothing is known of them."""
     return Seen(
         observations.points_robot,
         observations.covariances,
         observations.weights,
         observations.tangents,
         observations.facings,
-        votes_of(observations),
-    )
-
-
-def votes_of(observations: Observations) -> Float:
-    """(n,) the votes of ``observations``: all 1 where nothing is known of them."""
-    votes = observations.votes
-    return np.ones(len(observations.points_robot)) if votes is None else votes
+        np.ones(len(observations.points_robot)) if observations.votes is None
+        else observations.votes,
+    )  # fmt: skip
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -77,8 +136,68 @@ def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
     )
 
 
+def near(match: Match, prediction: Prediction) -> Match:
+    """The match, or odometry alone where rounding has carried it past all places and numbers."""
+    off = np.abs(match.T_map_robot - prediction.T_map_robot)
+    if off.max() <= odometry_steps.MOST_STEP_M and np.isfinite(match.information).all():
+        return match
+    return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
+
+
+class Usual:
+    """Of scans that the map took in.
+
+    matches  latest matched fractions
+    """
+
+    def __init__(self, config: UsualConfig, matches: Sequence[float] = ()) -> None:
+        self._config = config
+        self.matches: deque[float] = deque(matches, maxlen=config.remembered)
+        self._rewarded, self._overlapped = 0.0, 0.0
+
+    @property
+    def match(self) -> float:
+        """Median matched fraction."""
+        return median(self.matches) if self.matches else 1.0
+
+    def learn(self, match: Match, elapsed: float) -> None:
+        """The map took in a scan, so many s after the one before."""
+        self.matches.append(match.matched)
+        self._rewarded += self._forgotten(elapsed) * (match.rewarded - self._rewarded)
+
+    def follow(self, match: Match, observations: Observations, elapsed: float) -> None:
+        """A scan was matched, to the map or to a local copy."""
+        known = self._of_known(match, observations)
+        self._overlapped += self._forgotten(elapsed) * (known - self._overlapped)
+
+    def _forgotten(self, elapsed: float) -> float:
+        """Share of what is remembered of a second ago that a scan replaces."""
+        return min(1.0 - math.exp(-elapsed / self._config.fallen_s), 0.3)
+
+    def is_odd(self, match: Match, observations: Observations) -> bool:
+        """Whether so little is matched, or so suddenly less, that the map in view is to be asked.
+
+        Returns that have no vote and a reward that fell are the sign of a slip: who slipped sees
+        what stands at places that were empty.
+        """
+        config = self._config
+        if match.matched < config.odd * self.match:
+            return True
+        fell = match.rewarded < config.fallen * self._rewarded
+        return fell and observations.mean_vote < config.outvoted
+
+    def share(self, match: Match, observations: Observations) -> float:
+        """Of what all returns, voting or not, matched in the second before: what matches now."""
+        return self._of_known(match, observations) / max(self._overlapped, LEAST)
+
+    @staticmethod
+    def _of_known(match: Match, observations: Observations) -> float:
+        """Matched share of what the scans before had in view: nothing else can go on from them."""
+        return match.overlapped / max(observations.in_view, match.overlapped, LEAST)
+
+
 class Matcher:
-    """Matches observations to a map."""
+    """Matches observations to a map; ``usual``: what it is told of matches so far."""
 
     def __init__(self, config: TrackerConfig) -> None:
         self.config = config
@@ -96,7 +215,41 @@ class Matcher:
         steps = self.numbers.climb
         self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
         self._scratch = np.empty(SCRATCH)
+        self.usual = Usual(config.matching.usual)
+        self._odds = Odds(config.belief, config.carried_per_h)
         self._around = Around(self.reward.short_term)
+
+    def match(self, cell_map: CellMap, observations: Observations, prediction: Prediction) -> Match:
+        """Climb from the prediction; search around it when that is vague or finds too little.
+
+        Where too little is found, wheels may have slipped: it is searched as after a slip, and what
+        that finds has to be better by the price of a slip.
+        """
+        predicted, prior = prediction.T_map_robot, prediction.prior
+        precision = inverted(prior)
+        start = self.approach(cell_map, observations, predicted, prior)
+        match = self.climb(cell_map, observations, start, predicted, precision)
+        local, belief = self.numbers.local, self.config.belief
+        good = local.good_share * self.usual.match
+        vague_m = local.vague_cells * self.config.cell_m  # as far as the climb reaches
+        vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > vague_m
+        if not vague and match.matched >= good:
+            return match
+        near, widest = SearchWindow.about(prior, local), SearchWindow.widest(local)
+        slip = inverted(prior + np.diag([belief.slip_m**2, belief.slip_m**2, belief.slip_rad**2]))
+        slipped = self._odds.slipped(math.hypot(*prediction.increment[:2].tolist()), 0.0, 0.0)
+        around = self._around.of(cell_map)
+        for window, about, nats, enough in (
+            (near, precision, 0.0, math.inf if vague else 0.0),
+            (near, slip, slipped, good),
+            (widest, precision, 0.0, local.widest_share * good),
+        ):
+            if match.matched >= enough:
+                continue
+            found = self.search(cell_map, observations, predicted, about, window, around)
+            if found.score + nats > match.score:
+                match = replace(found, score=found.score + nats)
+        return match
 
     def climb(
         self,
@@ -152,7 +305,11 @@ class Matcher:
             return prediction
         numbers = self.numbers.climb
         every = max(1, math.ceil(n / numbers.few))
-        few = room_for(-(-n // every))
+        m = -(-n // every)
+        few = Seen(
+            points=np.empty((m, 2)), covariances=np.empty((m, 3)), weights=np.empty(m),
+            tangents=np.empty((m, 2)), facings=np.empty(m, np.uint8), votes=np.empty(m),
+        )  # fmt: skip
         widths = Widths(
             place=float(covariance[0, 0] + covariance[1, 1]),
             least=(numbers.moved_cells * self.config.cell_m) ** 2,
@@ -182,12 +339,8 @@ class Matcher:
         ``around``: what searches of the same frame laid out before.
         """
         start, evaluations = search(
-            cell_map, around or self.around(cell_map), observations, prediction, precision,
+            cell_map, around or self._around.of(cell_map), observations, prediction, precision,
             window, self.config.reward,
         )  # fmt: skip
         match = self.climb(cell_map, observations, start, prediction, precision)
         return replace(match, searched=True, evaluations=evaluations)
-
-    def around(self, cell_map: CellMap) -> Around:
-        """For several searches of one frame in one map; the next call takes its room."""
-        return self._around.of(cell_map)

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
 from slam.frontend.polar import bearing, bin_of
+from slam.frontend.surfaces import apart
 
 
 class Asking(NamedTuple):
@@ -190,21 +191,15 @@ def _along(  # noqa: PLR0913 (kernel)
     for k in range(n):
         if k > 0 and not joined[k - 1]:
             first = k
-        while _apart(points, first, k) >= reach:
+        while apart(points, first, k) >= reach:
             first += 1
         last = max(last, k)
-        while last + 1 < n and joined[last] and _apart(points, k, last + 1) < reach:
+        while last + 1 < n and joined[last] and apart(points, k, last + 1) < reach:
             last += 1
-        if _apart(points, first, last) >= thin:
+        if apart(points, first, last) >= thin:
             out[k] = min((before[last + 1] - before[first]) / (last + 1 - first), 1.0)
         else:
             out[k] = 1.0
-
-
-@inner
-def _apart(points: NDArray[np.float64], j: int, k: int) -> float:
-    dx, dy = points[j, 0] - points[k, 0], points[j, 1] - points[k, 1]
-    return math.sqrt(dx * dx + dy * dy)
 
 
 @uncounted

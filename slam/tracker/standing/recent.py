@@ -13,6 +13,7 @@ import numpy as np
 from slam import se2
 from slam.frames import NS_PER_S, Float
 from slam.frontend.observations import Observations
+from slam.tracker.standing.agreement import Agreement
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.kernels import Asking, votes
 
@@ -34,10 +35,13 @@ class Look:
 
 
 class Standing:
-    """Gives each return its vote, by how long its place was not seen empty."""
+    """Gives each return its vote, by how long its place was not seen empty.
+
+    agreement  of odometry with what was matched with these votes
+    """
 
     def __init__(self, config: StandingConfig) -> None:
-        self._config = config
+        self._config, self.agreement = config, Agreement(config)
         self._looks: deque[Look] = deque()
         # a little less, as scans come when they come
         first_s = 0.95 * config.spacing_s
@@ -65,6 +69,7 @@ class Standing:
 
     def moved(self, T_new_old: Float) -> None:
         """The map moved: so did what was seen in it."""
+        self.agreement.forget()
         self._looks = deque(
             replace(
                 look,

@@ -28,12 +28,15 @@ from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracking.keys import KeyFrame
+from slam.tracker.uncertainty.covariances import carried, observable
+from slam.tracker.uncertainty.residuals import look
 
 # What things cost, in units of drawing one key frame; measured on logs of 5 cm, 180 and 361 beams.
 UNIT_NS = 400_000  # of the counted price of a search, which is that of a slower machine
 DRAWN = 1  # the unit
 MATCHED, MATCHED_POINTS = 2, 60  # and one for so many points
 PIECE = 0.05  # of a scan's budget: after that a search pauses
+SAMPLES = 4  # of a scan's points, that say in which directions a match is one; set by hand
 KEPT = 64  # submaps; half a MB each at 3 cm and 180 beams
 
 
@@ -92,7 +95,7 @@ class Closures:
         self._spend_match(j)
         if match.matched >= self._numbers.good_step:
             step = match.T_map_robot
-            information = self._numbers.information_share * match.tau * match.information
+            information = self._information(cell_map, key.observations, match)
             covariance = inverted(information + precision)
         covariance = covariance + spread(self._numbers.chain_m, self._numbers.chain_rad)
         self.chained.append(se2.compose(self.chained[-1], step))
@@ -178,11 +181,32 @@ class Closures:
     def _edge(self, middle: int, j: int, match: Match, backing: float) -> Edge | None:
         if backing < self._numbers.good_support or match.matched < self._numbers.good_match:
             return None
-        information = self._numbers.information_share * match.tau * match.information
+        information = self._information(self._submap(middle), self._keys[j].observations, match)
         covariance = inverted(information + self._numbers.loose * np.eye(3))
         covariance = covariance + spread(self._numbers.loop_m, self._numbers.loop_rad)
         T_a_b = match.T_map_robot
         return Edge(a=middle, b=j, T_a_b=T_a_b, information=inverted(covariance), robust=True)
+
+    def _information(self, cell_map: CellMap, seen: Observations, match: Match) -> Float:
+        """(3, 3) of a match, used in the graph: none along a bare corridor.
+
+        There the overlaps' curvature is that of noise.
+        """
+        short_term, numbers = self._matcher.reward.short_term, cell_map.config.uncertainty
+        geometry, feigned = np.zeros((3, 3)), 0.0
+        step = max(1, len(seen.points_robot) // numbers.residuals.samples)
+        for turn in range(0, step, max(1, step // SAMPLES)):
+            one = look(cell_map, short_term, seen, match.T_map_robot, (1.0, 0.0), turn)
+            geometry, feigned = geometry + one.geometry, feigned + one.feigned
+        out, information = np.empty((3, 3)), match.tau * match.information
+        unobservable, along_rad = observable(geometry, feigned, numbers.pose.noisy, out)
+        if unobservable == 2:
+            information = np.diag([0.0, 0.0, information[2, 2]])
+        elif unobservable == 1:
+            x, y = math.cos(along_rad), math.sin(along_rad)
+            carried(information, np.zeros(3), x, y, out)
+            information = out
+        return self._numbers.information_share * information
 
     def _submap(self, middle: int) -> CellMap:
         """What the key frames about ``middle`` saw, in the frame of that one.

@@ -14,6 +14,7 @@ import math
 from collections import deque
 from collections.abc import Callable, Iterator
 from dataclasses import replace
+from functools import partial
 
 import numpy as np
 
@@ -30,6 +31,7 @@ from slam.tracker.tracking.closures import DRAWN, Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.merging import LEFT, MOST_KEYS, Merge
 from slam.tracker.tracking.passages import Passages
+from slam.tracker.tracking.pausing import Pausing
 from slam.tracker.tracking.redraw import Correction, Redrawing, torn_keys
 
 RARE_S = 0.3  # s between frames in the mean, from which on each gets all work; set by hand
@@ -60,7 +62,7 @@ class Loops(KeyFrames):
         self._edges: dict[tuple[int, int], Edge] = {}
         self.weights: dict[tuple[int, int], float] = {}  # of loops; near 0: let go of
         self._pending: list[Edge] = []  # closures that no other confirms so far
-        self._begun: Iterator[None] | None = None  # a search or tie that pauses
+        self._begun: Pausing | None = None  # a search or tie
         self._searched = 0  # key frames that were searched for a closure
         self._ties: deque[int] = deque()  # key frames to tie to other passages
         self._tied: list[Float | None] = []  # where each was when it was tied
@@ -73,8 +75,7 @@ class Loops(KeyFrames):
         self._most = MOST_KEYS  # key frames in the graph, before some are merged
         self._relaxation: Relaxation | None = None
         self._relaxed: list[tuple[int, int]] = []  # loops in it
-        self._fresh = 0  # loops since the last one
-        self._surprised = False
+        self._fresh, self._surprised = 0, False  # loops since the last one, any that is far off
         self._redrawing: Redrawing | None = None
         self._new_graph = False
         self._weighed = False  # the loops were, and nobody asked what follows
@@ -181,14 +182,14 @@ class Loops(KeyFrames):
             return self._go_on(self._begun)
         if self._searched < len(self.poses):
             self._searched += 1
-            return self._go_on(self._search(self._searched - 1))
+            return self._search(self._searched - 1)
         solve = self._fresh and (self._surprised or self._fresh >= self._numbers.batch)
         if solve or self._too_many():
             self._relaxed = list(self._edges)
             self._relaxation = Relaxation(np.array(self.poses), self._chain + self.edges)
             return self._cost(96)
         if self._ties:
-            return self._go_on(self._tie(self._ties.popleft()))
+            return self._go_on(Pausing(partial(self._tie, self._ties.popleft())))
         if len(self.poses) < len(self.keys):
             self._append(len(self.poses))
             return 1 + self.closures.spent
@@ -197,9 +198,9 @@ class Loops(KeyFrames):
             return self._cost(256)
         return self._look_again()
 
-    def _go_on(self, task: Iterator[None]) -> int:
+    def _go_on(self, task: Pausing) -> int:
         """A task up to where it pauses or ends; the cost."""
-        self._begun = task if next(task, "ended") is None else None
+        self._begun = task if task.go_on() else None
         return 1 + self.closures.spent
 
     def _cost(self, edges: int) -> int:
@@ -218,23 +219,24 @@ class Loops(KeyFrames):
         self._chain.append(step)
         self.poses.append(se2.compose(self.poses[-1], step.T_a_b))
 
-    def _search(self, j: int) -> Iterator[None]:
-        """Close a loop at key frame ``j`` if it is on one that no tie goes on with."""
+    def _search(self, j: int) -> int:
+        """Close a loop at key frame ``j`` if it is on one that no tie goes on with; the cost."""
         if self._edges:
             self._ties.append(j)
         closures = [b for a, b in self._edges if (a, b) not in self._links]
         if self.keys[j].found:
             self._link(j)
         if any(b >= j - self._numbers.every for b in closures[-self._numbers.batch :]):
-            return
+            return 1
         middle = self._passages.nearest_before(j, self.poses)
-        if middle is not None:
-            predicted = se2.between(self.poses[middle], self.poses[j])
-            gate = self._passages.gate(j, middle)
-            edge = yield from self.closures.search(middle, j, predicted, gate)
-            if edge is not None:
-                self._rough[j] = middle, j
-                self._take(edge, predicted)
+        return 1 if middle is None else self._go_on(Pausing(partial(self._close, middle, j)))
+
+    def _close(self, middle: int, j: int) -> Iterator[None]:
+        predicted = se2.between(self.poses[middle], self.poses[j])
+        gate = self._passages.gate(j, middle)
+        if edge := (yield from self.closures.search(middle, j, predicted, gate)):
+            self._rough[j] = middle, j
+            self._take(edge, predicted)
 
     def _link(self, j: int) -> None:
         """Tie key frame ``j`` to the last one before the robot was lost, by where it was found.
@@ -360,26 +362,24 @@ class Loops(KeyFrames):
 
     def _tie(self, j: int) -> Iterator[None]:
         """Tie a key frame to all passages along there."""
-        first, self._tied[j] = self._tied[j] is None, self.poses[j]
+        first, at, found = self._tied[j] is None, self.poses[j], []
         for middle in self._passages.all_near(j, self.poses):
-            predicted = se2.between(self.poses[middle], self.poses[j])
-            edge = yield from self.closures.tie(middle, j, predicted)
-            if edge is not None:
-                if self._rough.get(j) == (middle, j):
-                    del self._rough[j]
-                self._take(edge, predicted)
-                if first and j % self._numbers.every == 0:
-                    self._later.append((j + 2 * self._numbers.submap, middle))
-                self._tied_to.add(j)
+            predicted = se2.between(self.poses[middle], at)
+            if edge := (yield from self.closures.tie(middle, j, predicted)):
+                found.append((edge, predicted))
             yield
-        self._drop_rough(j)
-
-    def _drop_rough(self, j: int) -> None:
-        """Ties about ``j`` take the place of what was found there by a wide search."""
+        self._tied[j] = at
+        for edge, predicted in found:
+            if self._rough.get(j) == (edge.a, j):
+                del self._rough[j]
+            self._take(edge, predicted)
+            if first and j % self._numbers.every == 0:
+                self._later.append((j + 2 * self._numbers.submap, edge.a))
+            self._tied_to.add(j)
+        # ties take the place of what was found there by a wide search
         near = range(j - self._numbers.every, j + self._numbers.every + 1)
-        if self._tied_to.intersection(near):
-            for k in near:
-                self._edges.pop(self._rough.pop(k, (-1, -1)), None)
+        for k in near if self._tied_to.intersection(near) else ():
+            self._edges.pop(self._rough.pop(k, (-1, -1)), None)
 
     def _look_again(self) -> int:
         """Tie a key frame anew that the graph has moved since; the cost, 0 if there is none."""

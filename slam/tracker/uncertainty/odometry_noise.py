@@ -21,11 +21,6 @@ from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import innovation
 
 
-def _noise_share(config: TrackerConfig, sensor_sigma_m: float) -> float:
-    """Variance of a match by the noise of its beams over what the overlaps' curvature claims."""
-    return (sensor_sigma_m / (config.frontend.sigma_cells * config.cell_m)) ** 2 / 2.0
-
-
 def _across(covariance: Float, across: tuple[float, float]) -> float:
     """Variance of the position along a unit vector; of both directions where that is zero."""
     (a, b, _), (_, d, _), _ = covariance.tolist()
@@ -53,7 +48,7 @@ class OdometryNoise:
         """``overlaps``: a match's information is the curvature of overlaps, which claims more than
         the noise of beams says; ``least_stated``: least scale of a covariance that a log states.
         """
-        self._whole, self._overlaps = config, overlaps
+        self._sigma_m = config.frontend.sigma_cells * config.cell_m if overlaps else None
         self._config = config.uncertainty.odometry
         self._least_stated = least_stated
         self.scales: Float = np.ones(2)
@@ -83,7 +78,7 @@ class OdometryNoise:
 
     def noise_share(self, sensor_sigma_m: float) -> float:
         """Variance of a match by the noise of what was seen over what its information claims."""
-        return _noise_share(self._whole, sensor_sigma_m) if self._overlaps else 1.0
+        return 1.0 if self._sigma_m is None else (sensor_sigma_m / self._sigma_m) ** 2 / 2.0
 
     def predict(self, T_map_before: Float, before: Odometry, now: Odometry) -> Prediction:
         """The prior of a frame."""
@@ -144,7 +139,3 @@ class OdometryNoise:
             self._expected[k] = keep * self._expected[k] + weight * unit
             scale = float(self._squares[k]) / max(float(self._expected[k]), 1e-9)
             self.scales[k] = min(max(scale, self._least), config.most)
-
-    def skip(self) -> None:
-        """The match of this frame is not used."""
-        self.nis = None

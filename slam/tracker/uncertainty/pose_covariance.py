@@ -38,6 +38,7 @@ class PoseCovariance:
                   the noise of their beams would
     unseen_s      s since all directions were observable, lost ones too; it fades once they are
     along_rad     direction in the map of the one that is not observable, None unless it is one
+    loaded        (3, 3) by how much the first pose in a loaded map may be off; None without one
     """
 
     def __init__(self, config: TrackerConfig, *, of_points: bool = False) -> None:
@@ -61,6 +62,7 @@ class PoseCovariance:
         self._shared: Float = np.zeros((3, 3))
         self._by_movers: Float = np.zeros((3, 3))
         self.by_movers_m = 0.0
+        self.loaded: Float | None = None
 
     @property
     def shared_m2(self) -> float:
@@ -75,8 +77,9 @@ class PoseCovariance:
         self._by_movers = np.zeros((3, 3))
         self.unseen_s = 0.0
 
-    def resumed(self, covariance: Float) -> None:
+    def resumed(self, covariance: Float, loaded: Float) -> None:
         """Going on in a map of before, which is off by ``covariance`` (3, 3) as a whole."""
+        self.loaded = loaded
         self._drift = covariance.copy()
         self.covariance = covariance.copy()
 
@@ -129,7 +132,10 @@ class PoseCovariance:
         self.unseen_s = (
             self.unseen_s + prediction.elapsed if self.unobservable else self.unseen_s * faded
         )
-        variance = (self._lattice + config.shared_times**2 * self.shared_m2) * self._fewer()
+        # by how much shared errors of surfaces average out less than in a whole room
+        seen = self._in_view / max(self._looks, config.forgotten)
+        fewer = max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
+        variance = (self._lattice + config.shared_times**2 * self.shared_m2) * fewer
         frames = max(1.0, config.correlated_s / max(prediction.elapsed, 1e-3))
         advance(
             self._drift,
@@ -162,6 +168,11 @@ class PoseCovariance:
             self.covariance = self.covariance + now
         self.by_movers_m = _far(self._by_movers if now is None else self._by_movers + now)
 
+    def p_off(self, alert_m: float) -> float:
+        """Probability that movers carried map and robot off by more than ``alert_m`` (Rayleigh)."""
+        least = min(alert_m, self.by_movers_m)
+        return math.exp(-((alert_m / self.by_movers_m) ** 2)) if least > 0.0 else 0.0
+
     def turned(self, by: float) -> None:
         """The map frame was turned by ``by`` rad, and the robot with it."""
         self._drift, self._blind = turned(self._drift, by), turned(self._blind, by)
@@ -172,12 +183,6 @@ class PoseCovariance:
         self._by_movers = turned(self._by_movers, by)
         self.along_rad = None if self.along_rad is None else self.along_rad + by
         self.covariance = self._drift + self._blind + self._shared
-
-    def _fewer(self) -> float:
-        """By how much the shared errors of surfaces average out less than in a whole room."""
-        config = self._config
-        seen = self._in_view / max(self._looks, config.forgotten)
-        return max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
 
     def _learn(self, evidence: Evidence, elapsed: float) -> None:
         keep = math.exp(-elapsed / self._config.shared_s)

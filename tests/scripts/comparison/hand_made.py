@@ -8,8 +8,9 @@ import math
 import numpy as np
 
 from scripts.comparison.recording import NOTHING, STATIC, Recording
-from slam.frames import Frame, LaserSpec, Odometry, Scan
+from slam.frames import LaserSpec
 from slam.system import Raster
+from tests.world2d import frame_at
 
 SPEC = LaserSpec(
     n_beams=361, angle_min=-math.pi / 2, angle_increment=math.radians(0.5), range_max=80.0
@@ -47,14 +48,8 @@ def recording(chairs) -> Recording:
     for k, chair in enumerate(chairs):
         stamp_ns = k * 1_000_000_000 // HZ
         ranges, hit = scan_of(chair)
-        frames.append(
-            Frame(
-                stamp_ns=stamp_ns,
-                odometry=Odometry(stamp_ns=stamp_ns, T_odom_robot=np.zeros(3), twist=np.zeros(3)),
-                scan=Scan(stamp_ns=stamp_ns, ranges=ranges, spec=SPEC),
-                truth=np.zeros(3),
-            )
-        )
+        zero = np.zeros(3)
+        frames.append(frame_at(stamp_ns, zero, ranges, SPEC, twist=zero, truth=zero))
         hits.append(hit)
         poses.append([[*chair, 0.0], [2.0, -3.0, math.pi / 2]])
     return Recording(

@@ -13,7 +13,7 @@ from typer.testing import CliRunner
 
 from scripts.cli import app
 from scripts.debugger.counterfactual import Inquest, Question, Trial, hold
-from scripts.debugger.picture import blame_picture
+from scripts.debugger.make import blame_picture
 from scripts.debugger.recording import Case, Checkpoint, Tape, record
 from scripts.debugger.words import as_json, headline
 from sim.twins.absence import Change

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import json
 import math
-import subprocess
-import sys
 from dataclasses import replace
 from pathlib import Path
 
@@ -18,6 +16,7 @@ from scripts.integrity.campaign import summary
 from scripts.integrity.ways import EACH, WAYS, Case, cases
 from slam.errors import InvalidValueError
 from slam.odometry import OdometrySlam
+from tests.processes import python
 
 WORDS = ["--ways", "chairs", "corridor", "--slams", "odometry", "--losses", "2", "--no-page"]
 
@@ -75,7 +74,7 @@ def test_what_was_done_is_not_done_again(tmp_path, monkeypatch, capsys):
 def test_a_case_depends_on_all_that_it_runs():
     """Every module of ours that a case imports is in the digest, but for what only transports."""
     code = "import sys, scripts.integrity.losses; print(*[m for m in sys.modules])"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
+    done = python("-c", code)
     own = [name for name in done.stdout.split() if name.startswith("scripts.integrity.")]
     listed = {f"scripts.integrity.{path.stem}" for path in campaign.CODE}
     assert own

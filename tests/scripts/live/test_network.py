@@ -73,10 +73,10 @@ def test_messages_are_what_a_page_may_ask_for(network):
 @pytest.mark.parametrize(
     ("topic", "taken", "match"),
     [
-        ("/cmd_vel", twist(np.nan), "/cmd_vel: drive: v must be a number"),
+        ("/cmd_vel", twist(np.nan), "/cmd_vel: Drive.v must be a number"),
         ("/cmd_vel", Taken(b"\x00\x01\x00\x00abc", "a"), "7 bytes that are no geometry_msgs"),
         ("/mobilia/door", word("ajar"), "'open' or 'shut'"),
-        ("/mobilia/push", word("x" * 101), "up to 100 letters"),
+        ("/mobilia/push", word("x" * 101), "0 to 100 letters"),
     ],
 )
 def test_what_cannot_be_is_left_out_and_said(network, topic, taken, match):

@@ -30,7 +30,7 @@ from sim.loop import LoopConfig
 from slam.errors import MobiliaError
 from slam.maps import write_map
 from slam.shunting import ShuntingSlam
-from slam.shunting.config import ShuntingConfig
+from slam.shunting.slam import ShuntingConfig
 from slam.system import Raster
 from slam.tracker import map_file
 

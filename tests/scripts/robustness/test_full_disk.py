@@ -6,7 +6,6 @@ from __future__ import annotations
 import os
 import shutil
 import subprocess
-import sys
 from collections.abc import Callable, Iterator
 from pathlib import Path
 
@@ -23,8 +22,8 @@ from slam.files import write_bytes
 from slam.maps import read_map, write_map
 from slam.shunting import ShuntingSlam
 from slam.system import Raster
+from tests.processes import python
 
-REPO = Path(__file__).resolve().parents[3]
 FULL = "No space left on device"
 Disk = Callable[[int], Path]
 
@@ -149,11 +148,8 @@ def test_tables_of_a_comparison(disk: Disk, tmp_path: Path):
 def test_two_processes(disk: Disk):
     place = disk(100)
     words = ("generate", "arena", "--episodes", "2", "--seconds", "20")
-    done = subprocess.run(
-        [sys.executable, "-m", "scripts", *words, "--jobs", "2", "--out", "out"],
-        cwd=place, env={**os.environ, "PYTHONPATH": str(REPO)}, capture_output=True, text=True,
-        check=False,
-    )  # fmt: skip
+    words = ("-m", "scripts", *words, "--jobs", "2", "--out", "out")
+    done = python(*words, cwd=place, check=False)
     assert done.returncode == 1
     assert done.stderr.count("\n") == 1
     assert f"{place}/out/arena-" in done.stderr

@@ -4,7 +4,6 @@
 from __future__ import annotations
 
 import json
-import os
 import signal
 import subprocess
 import sys
@@ -17,21 +16,14 @@ import pytest
 
 from slam.maps import read_map
 from slam.trajectory import read_tum
+from tests.processes import python
 
 REPO = Path(__file__).resolve().parents[3]
 
 
 def mobilia(*words: str | Path, **environment: str) -> subprocess.CompletedProcess[str]:
     """The command as a process of its own, which takes seconds to start."""
-    return subprocess.run(
-        [sys.executable, "-m", "scripts", *map(str, words)],
-        capture_output=True,
-        text=True,
-        check=False,
-        timeout=240,
-        cwd=REPO,
-        env={**os.environ, "COLUMNS": "200", **environment},
-    )
+    return python("-m", "scripts", *words, check=False, **environment)
 
 
 @pytest.fixture(scope="module")

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import json
 import re
-import subprocess
-import sys
 from pathlib import Path
 
 import pytest
@@ -19,6 +17,7 @@ from sim.actors.config import ACTORS
 from sim.sensors.lidar import registry
 from slam import config_of
 from slam.set_numbers import with_set
+from tests.processes import python
 
 
 def numbers(capsys: pytest.CaptureFixture[str], what: str, group: str = "") -> list[dict]:
@@ -86,8 +85,8 @@ def test_the_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
 
 def test_the_numbers_of_a_slam_need_no_simulator() -> None:
     code = "import slam, sys; slam.config_of('shunting')[0].sha256(); print(sorted(sys.modules))"
-    done = subprocess.run([sys.executable, "-c", code], capture_output=True, text=True, check=True)
-    assert "'slam.shunting.config'" in done.stdout
+    done = python("-c", code)
+    assert "'slam.shunting.slam'" in done.stdout
     assert "'mujoco'" not in done.stdout
 
 

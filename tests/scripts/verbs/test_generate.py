@@ -32,6 +32,7 @@ from slam.evaluation.wide_tum import to_body
 from slam.logs import read_bag, read_carmen
 from slam.ros.template import EPOCH_NS
 from slam.trajectory import read_tum
+from tests.processes import python
 
 REPO = Path(__file__).resolve().parents[3]
 SETTINGS = {"episodes": 3, "seconds": 1.5, "seed": 1}
@@ -124,11 +125,7 @@ def test_numpy_without_its_vector_units_makes_the_same_messages(serial, tmp_path
         "again = record(made.recipe, Path(sys.argv[1]))\n"
         "print(again[made.recipe.name]['messages_sha256'], made_with()['cpu'] or 'none')\n"
     )
-    done = subprocess.run(
-        [sys.executable, "-c", code, str(tmp_path)], capture_output=True, text=True, check=False,
-        env=environment(NPY_DISABLE_CPU_FEATURES=" ".join(found)),
-    )  # fmt: skip
-    assert done.returncode == 0, done.stderr
+    done = python("-c", code, tmp_path, NPY_DISABLE_CPU_FEATURES=" ".join(found))
     digest, cpu = done.stdout.split()[:2]
     made = read_recipe(serial / NAMES[0] / RECIPE)
     assert digest == made.result["messages_sha256"]

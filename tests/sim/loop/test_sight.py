@@ -9,19 +9,15 @@ import math
 import numpy as np
 
 from sim.loop.sight import MEMORY_S, THIN_RADIUS_M, WIDE_RADIUS_M, Sight
-from slam.frames import Frame, LaserSpec, Odometry, Scan, to_ns
+from slam.frames import LaserSpec, to_ns
+from tests.world2d import frame_at
 
 SPEC = LaserSpec(n_beams=361, angle_min=-math.pi / 2, angle_increment=math.pi / 360, range_max=20.0)
 POST = slice(178, 183)  # 2.5 degrees straight ahead: 4 to 7 cm at 1 to 1.6 m
 
 
 def frame(second, ranges, here=(0.0, 0.0, 0.0)):
-    stamp = to_ns(second)
-    return Frame(
-        stamp_ns=stamp,
-        odometry=Odometry(stamp_ns=stamp, T_odom_robot=np.array(here), twist=np.zeros(3)),
-        scan=Scan(stamp_ns=stamp, ranges=np.asarray(ranges, np.float32), spec=SPEC),
-    )
+    return frame_at(to_ns(second), here, ranges, SPEC, twist=np.zeros(3))
 
 
 def wall(distance=2.0):

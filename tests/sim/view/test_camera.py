@@ -16,16 +16,13 @@ import scenes
 from sim.view import gl
 from sim.view.camera import Camera, soften
 from slam.errors import InvalidValueError, MissingDependencyError
+from tests.built_scenes import placed
+from tests.processes import python
 
 
 @pytest.fixture(scope="module")
 def world():
-    scene = scenes.build("arena", 0, n_chairs=4)
-    model = scene.compile()
-    data = mujoco.MjData(model)
-    scene.place(model, data)
-    mujoco.mj_forward(model, data)
-    return model, data
+    return placed(scenes.build("arena", 0, n_chairs=4))
 
 
 @pytest.fixture(scope="module")
@@ -178,9 +175,7 @@ def test_a_bad_mujoco_gl_does_not_kill_the_program(value):
 
 def test_the_probe_itself_imports_no_mujoco():
     program = "import sys, sim.view.gl; print('mujoco' in sys.modules)"
-    run = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
+    run = python("-c", program)
     assert run.stdout.strip() == "False"
 
 

@@ -5,8 +5,6 @@ from __future__ import annotations
 
 import hashlib
 import math
-import subprocess
-import sys
 
 import mujoco
 import numpy as np
@@ -19,6 +17,7 @@ from sim.core.seeds import Seeds
 from sim.world.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.errors import InvalidValueError
+from tests.processes import python
 
 STILL = Dynamism.at(0)
 
@@ -50,9 +49,7 @@ print(digest(run(lively({seed}), 6.0)))
 
 def in_another_process(seed: int) -> str:
     program = PROGRAM.format(folder=__file__.rsplit("/", 1)[0], seed=seed)
-    done = subprocess.run(
-        [sys.executable, "-c", program], capture_output=True, text=True, check=True
-    )
+    done = python("-c", program)
     return done.stdout.strip()
 
 

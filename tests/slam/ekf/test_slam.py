@@ -176,15 +176,11 @@ def test_lost_is_said():
     estimates = []
     for k, frame in enumerate(frames):
         if k > 20:
-            frame = Frame(
-                stamp_ns=frame.stamp_ns,
-                odometry=frame.odometry,
-                features=Features(
-                    stamp_ns=frame.stamp_ns,
-                    points_robot=np.zeros((0, 2)),
-                    covariances=np.zeros((0, 2, 2)),
-                ),
-            )
+            nothing = replace(
+                frame.features, points_robot=np.zeros((0, 2)), covariances=np.zeros((0, 2, 2)),
+                ids=None,
+            )  # fmt: skip
+            frame = replace(frame, features=nothing)
         estimates.append(system.update(frame.without_truth()))
     assert all(e.converged for e in estimates[:21])
     assert not estimates[-1].converged

@@ -10,7 +10,8 @@ import pytest
 
 from slam.errors import InvalidValueError
 from slam.evaluation.evidence import beside, evidence_of
-from slam.frames import Frame, LaserSpec, Odometry, Scan
+from slam.frames import Frame, LaserSpec, Scan
+from tests.world2d import frame_at
 
 SPEC = LaserSpec(n_beams=91, angle_min=-math.pi / 4, angle_increment=math.pi / 180)
 POSES = np.array([[0.1 * k, 0.05 * k, 0.02 * k] for k in range(12)])
@@ -43,14 +44,7 @@ def test_a_wall_stands_and_a_thing_that_left_does_not() -> None:
 
 def test_scans_beside_scans_that_are_nearer() -> None:
     def frames(scans: list[Scan]) -> list[Frame]:
-        return [
-            Frame(
-                stamp_ns=s.stamp_ns,
-                odometry=Odometry(stamp_ns=s.stamp_ns, T_odom_robot=np.zeros(3)),
-                scan=s,
-            )
-            for s in scans
-        ]
+        return [frame_at(s.stamp_ns, scan=s) for s in scans]
 
     words = beside(frames(_scans()), frames(_scans(chair=(0, 1, 2))), POSES).words()
     assert words["stands"]["median_m"] == 0.0

@@ -10,7 +10,7 @@ from slam import se2
 from slam.frames import LaserSpec, Scan
 from slam.frontend.deskew import end_points
 from slam.frontend.observations import from_scan
-from slam.shunting.config import ShuntingConfig
+from slam.shunting.slam import ShuntingConfig
 
 SPEC = LaserSpec(
     n_beams=7, angle_min=-1.5, angle_increment=0.5, T_robot_laser=np.array([0.3, -0.1, 0.2]),

@@ -12,7 +12,7 @@ import numpy as np
 import pytest
 from numpy.typing import NDArray
 
-from slam import LaserSpec, Scan, create, se2
+from slam import LaserSpec, create, se2
 from slam.errors import InvalidValueError
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import NS_PER_S, Features, Frame, Odometry
@@ -114,12 +114,7 @@ def test_every_slam_refuses_frames_out_of_order_at_once(name):
     spec = LaserSpec(n_beams=181, angle_min=-1.57, angle_increment=math.radians(1.0))
 
     def frame(stamp_ns: int) -> Frame:
-        ranges = 3.0 + np.sin(np.arange(181) * 0.1)
-        return Frame(
-            stamp_ns=stamp_ns,
-            odometry=Odometry(stamp_ns=stamp_ns, T_odom_robot=np.zeros(3)),
-            scan=Scan(stamp_ns=stamp_ns, ranges=ranges, spec=spec),
-        )
+        return world2d.frame_at(stamp_ns, ranges=3.0 + np.sin(np.arange(181) * 0.1), spec=spec)
 
     slam = create(name)
     slam.update(frame(10**9))

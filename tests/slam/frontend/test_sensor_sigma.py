@@ -12,7 +12,7 @@ from slam.errors import InvalidValueError
 from slam.frames import Frame, LaserSpec, Odometry, Scan
 from slam.frontend.config import FRONTEND
 from slam.frontend.observations import from_scan
-from slam.shunting.config import ShuntingConfig
+from slam.shunting.slam import ShuntingConfig
 from slam.system import create
 
 SPEC = LaserSpec(n_beams=181, angle_min=-1.5, angle_increment=0.016)

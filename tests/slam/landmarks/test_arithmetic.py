@@ -8,7 +8,7 @@ import pytest
 
 from slam import se2
 from slam.landmarks import kernels
-from slam.landmarks.compatibility import distances
+from slam.landmarks.association import distances
 from slam.landmarks.filter import EkfFilter
 
 

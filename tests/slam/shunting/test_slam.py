@@ -3,8 +3,8 @@
 
 from __future__ import annotations
 
-import dataclasses
 import math
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -70,20 +70,7 @@ def test_deskewing_helps_in_a_fast_turn() -> None:
     spec = laser(361, interlaced=True)
     drive = Drive((0.0, 0.0, 0.0), ((0.3, 2.5, 3.0), (0.3, -2.5, 3.0)))
     stream = frames(World2D(arena()), drive, rate_hz=10.0, spec=spec, seed=2)
-    blind = [
-        Frame(
-            stamp_ns=f.stamp_ns,
-            odometry=Odometry(
-                stamp_ns=f.stamp_ns,
-                T_odom_robot=f.odometry.T_odom_robot,
-                increment_covariance=f.odometry.increment_covariance,
-                twist=np.zeros(3),
-            ),
-            scan=f.scan,
-            truth=f.truth,
-        )
-        for f in stream
-    ]
+    blind = [replace(f, odometry=replace(f.odometry, twist=np.zeros(3))) for f in stream]
     helped, not_helped = errors(ShuntingSlam(FAST), stream), errors(ShuntingSlam(FAST), blind)
     assert rms(helped[:, 2:]) < 0.5 * rms(not_helped[:, 2:])
 
@@ -114,14 +101,7 @@ def test_point_features_alone_are_enough(preset: str, limit: float) -> None:
             points_robot=seen,
             covariances=np.tile(0.005**2 * np.eye(2), (len(seen), 1, 1)),
         )
-        stream.append(
-            Frame(
-                stamp_ns=frame.stamp_ns,
-                odometry=frame.odometry,
-                features=features,
-                truth=frame.truth,
-            )
-        )
+        stream.append(replace(frame, scan=None, features=features))
     config = getattr(ShuntingConfig, preset)(cell_m=0.1)
     error = errors(slam.create("shunting", config=config), stream)
     assert rms(error[:, :2]) < limit
@@ -298,7 +278,7 @@ def test_no_frame_waits_for_the_compiler() -> None:
         here, elsewhere = stream[3], stream[60].scan
         assert elsewhere is not None
         scan = Scan(stamp_ns=here.stamp_ns, ranges=elsewhere.ranges, spec=elsewhere.spec)
-        unsure = dataclasses.replace(here.odometry, increment_covariance=np.diag([0.04, 0.04, 0.1]))
+        unsure = replace(here.odometry, increment_covariance=np.diag([0.04, 0.04, 0.1]))
         jump = Frame(stamp_ns=here.stamp_ns, odometry=unsure, scan=scan)
         searched = system.update(jump).diagnostics["searched"]
         system.map()

@@ -6,8 +6,8 @@ from __future__ import annotations
 import pytest
 
 from slam.errors import UnknownNameError
-from slam.grid.config import OccupancyConfig
-from slam.shunting.config import ShuntingConfig
+from slam.grid.occupancy import OccupancyConfig
+from slam.shunting.slam import ShuntingConfig
 from slam.tracker.config import TrackerConfig
 
 TOP = [

@@ -17,6 +17,7 @@ from slam.evaluation.scanner.noise import flicker_variance, sigma_as_sent, sigma
 from slam.evaluation.scanner.stretches import CREPT_M, LEAST_STANDING
 from slam.evaluation.scanner.walls import walls
 from slam.frames import Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata, to_ns
+from tests.world2d import frame_at
 
 SPEC = LaserSpec(n_beams=181, angle_min=-math.pi / 2, angle_increment=math.radians(1.0))
 ROOM = ((-4.0, -2.5), (5.0, -2.5), (5.0, 3.5), (-4.0, 3.5))
@@ -87,12 +88,8 @@ def log(errors, *, places=12, outlines=(ROOM,), scans=SCANS, seed=0, driving=Fal
             moved = 0.02 * k if driving else 0.0
             true = (exact(x + moved, y, yaw, outlines) if moved else still) + errors.drift * k
             stamp = to_ns(0.1 * next(clock))
-            frames.append(Frame(
-                stamp_ns=stamp,
-                odometry=Odometry(stamp_ns=stamp, T_odom_robot=np.array([x + moved, y, yaw])),
-                scan=Scan(stamp_ns=stamp, ranges=seen(true, errors, rng, fixed).astype(np.float32),
-                          spec=SPEC),
-            ))  # fmt: skip
+            ranges = seen(true, errors, rng, fixed)
+            frames.append(frame_at(stamp, (x + moved, y, yaw), ranges, SPEC))
     return Stream(metadata=StreamMetadata(source="made", laser=SPEC, odometry=wheels),
                   frames=lambda: frames)  # fmt: skip
 

@@ -12,8 +12,8 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from slam.frontend.visibility import View
-from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
+from slam.shunting.slam import ShuntingConfig
 from slam.tracker.cells import FREE_COUNT, SIDE, TOUCHED_COUNT
 
 Array = NDArray[np.float64]

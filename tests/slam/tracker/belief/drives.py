@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.estimate import Estimate
 from slam.frames import Frame, Odometry, Scan
-from slam.grid.config import OccupancyConfig
-from slam.grid.occupancy import OccupancySlam
+from slam.grid.occupancy import OccupancyConfig, OccupancySlam
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.tracker import Tracker
 from tests.world2d import Drive, World2D, arena, frames, rectangle

@@ -15,8 +15,8 @@ from slam.frames import Features, Odometry, Scan
 from slam.frontend import surfaces
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_prior import inverted, predict, turned
-from slam.shunting.config import ShuntingConfig
 from slam.shunting.map.network import Network
+from slam.shunting.slam import ShuntingConfig
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Matcher, seen_by
 from slam.tracker.matching.score import evaluate

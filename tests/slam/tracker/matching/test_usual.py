@@ -11,8 +11,7 @@ import numpy as np
 import pytest
 
 from slam.tracker.matching.config import UsualConfig
-from slam.tracker.matching.matcher import Match
-from slam.tracker.matching.usual import Usual
+from slam.tracker.matching.matcher import Match, Usual
 
 CONFIG = UsualConfig()
 STEP_S = 0.2

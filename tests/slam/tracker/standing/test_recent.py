@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from slam.frames import NS_PER_S, Scan
 from slam.frontend.observations import Observations, from_scan
-from slam.shunting.config import ShuntingConfig
-from slam.tracker.matching.matcher import Matcher, votes_of
+from slam.shunting.slam import ShuntingConfig
+from slam.tracker.matching.matcher import Matcher, seen_by
 from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 from slam.tracker.standing.recent import Standing
 from tests.slam.tracker.matching.test_matcher import CONFIG, room
@@ -44,7 +44,7 @@ def votes(
     """Of what is nearer than the walls, and of the walls, ``age_s`` after the only earlier scan."""
     standing = Standing(NUMBERS)
     standing.add(0, HERE, before)
-    found = votes_of(standing.with_votes(round(age_s * NS_PER_S), HERE, prior, now))
+    found = seen_by(standing.with_votes(round(age_s * NS_PER_S), HERE, prior, now)).votes
     x, y = now.points_robot.T
     inside = (np.abs(x - 1.0) < 3.8) & (np.abs(y) < 2.8)
     return found[inside], found[~inside]
@@ -107,10 +107,10 @@ def test_what_no_scan_had_in_view_is_told_apart() -> None:
 
 def test_all_vote_without_earlier_scans_and_when_it_is_off() -> None:
     now = seen(box(2.0, 0.0))
-    assert votes_of(Standing(NUMBERS).with_votes(0, HERE, SURE, now)).min() == 1.0
+    assert seen_by(Standing(NUMBERS).with_votes(0, HERE, SURE, now)).votes.min() == 1.0
     off = Standing(ALL_VOTE)
     off.add(0, HERE, seen())
-    assert votes_of(off.with_votes(NS_PER_S // 5, HERE, SURE, now)).min() == 1.0
+    assert seen_by(off.with_votes(NS_PER_S // 5, HERE, SURE, now)).votes.min() == 1.0
 
 
 def test_scans_are_kept_for_seconds_at_any_rate_and_few_are_asked() -> None:
@@ -135,7 +135,7 @@ def test_with_all_votes_a_match_is_bit_for_bit_one_without() -> None:
     other = matcher.climb(network, _voting(scan, same), start, HERE, firm)
     assert one.T_map_robot.tobytes() == other.T_map_robot.tobytes()
     assert one.matched == other.matched == other.overlapped
-    assert votes_of(scan).min() == 1.0
+    assert seen_by(scan).votes.min() == 1.0
 
 
 def test_without_a_vote_what_is_young_says_nothing_and_is_not_missed() -> None:

@@ -3,6 +3,7 @@
 
 from __future__ import annotations
 
+import copy
 import itertools
 from collections.abc import Generator
 from dataclasses import replace
@@ -108,6 +109,17 @@ def test_the_graph_does_not_depend_on_how_many_submaps_are_kept(
         assert len(graph.closures._submaps) <= kept
         found.append(graph.corrected(drifted[2]))
     np.testing.assert_array_equal(*found)
+
+
+def test_a_copy_amid_a_search_comes_to_the_same_graph(drifted: Drifted) -> None:
+    graph = filled(Loops(CONFIG, Matcher(CONFIG), lambda: Network(CONFIG)), drifted)
+    while graph._begun is None:
+        graph.work()
+    other = copy.deepcopy(graph)
+    finish(graph)
+    finish(other)
+    assert len(graph.edges) >= 3
+    np.testing.assert_array_equal(other.corrected(drifted[2]), graph.corrected(drifted[2]))
 
 
 class Aliased(Loops):

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import dataclasses
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -27,6 +28,28 @@ from tests.world2d import Drive, World2D, arena, frames, laser, rectangle, wande
 CONFIG = ShuntingConfig.robust(cell_m=0.05)
 SIGMA_M = CONFIG.frontend.sensor_sigma_m
 LONG = World2D(rectangle(-60.0, -1.0, 60.0, 1.01))
+ZERO = np.zeros(3)
+
+
+def moved(*sigmas: float, elapsed: float = 0.2) -> Prediction:
+    """Odometry that stands at the origin, with those standard deviations."""
+    covariance = np.diag(np.square(sigmas))
+    return Prediction(
+        T_map_robot=ZERO, increment=ZERO, covariance=covariance, twist=ZERO, elapsed=elapsed
+    )
+
+
+def matched(information: Float, T: Float = ZERO) -> Match:
+    """A match of all beams; of none where it says nothing."""
+    share = float(information.any())
+    return Match(T_map_robot=T, information=information, matched=share, score=0.0, tau=share)
+
+
+def seen(geometry: Float, weighed: float = 20.0, **more: Any) -> Evidence:
+    """Surfaces of that geometry a beam, seen long and with errors of their own."""
+    rest: dict[str, Any] = {"in_view": 75.0, "shared": 0.0, "feigned": 0.0, "new": 0.0} | more
+    rest = {"paired": weighed, "new_geometry": ZERO} | rest
+    return Evidence(geometry=weighed * geometry, weighed=weighed, **rest)
 
 
 def driven(stream: list[Frame]) -> list[Estimate]:
@@ -91,9 +114,9 @@ def mapped(world: World2D) -> tuple[Network, list[Scan]]:
     network = Network(CONFIG)
     for scan in scans[:80]:
         assert scan is not None
-        seen = from_scan(scan, np.zeros(3), CONFIG)
-        rasterise(network, seen, np.zeros(3))
-        network.integrate(seen.view, seen.T_robot_laser, 0.2, write=True)
+        view = from_scan(scan, np.zeros(3), CONFIG)
+        rasterise(network, view, np.zeros(3))
+        network.integrate(view.view, view.T_robot_laser, 0.2, write=True)
     return network, [scan for scan in scans[80:] if scan is not None]
 
 
@@ -106,8 +129,8 @@ def test_matches_scatter_as_their_information_says() -> None:
         CONFIG.frontend.sensor_sigma_m / (CONFIG.frontend.sigma_cells * CONFIG.cell_m)
     ) ** 2 / 2.0
     for scan in scans:
-        seen = from_scan(scan, np.zeros(3), CONFIG)
-        match = matcher.climb(network, seen, np.zeros(3), np.zeros(3), flat)
+        view = from_scan(scan, np.zeros(3), CONFIG)
+        match = matcher.climb(network, view, np.zeros(3), np.zeros(3), flat)
         poses.append(match.T_map_robot)
         claimed.append(share * np.linalg.inv(match.information))
     sampled, expected = np.cov(np.array(poses).T), np.mean(claimed, axis=0)
@@ -123,9 +146,9 @@ def test_residuals_of_noise_are_not_shared_and_a_moved_wall_is() -> None:
         shared = paired = 0.0
         for turn, scan in enumerate(scans):
             ranges = scan.ranges + np.float32(longer)
-            moved = Scan(stamp_ns=scan.stamp_ns, ranges=ranges, spec=scan.spec)
-            seen = from_scan(moved, np.zeros(3), CONFIG)
-            evidence = look(network, 0.3, seen, np.zeros(3), (0.2, 0.0), turn)
+            longer_scan = Scan(stamp_ns=scan.stamp_ns, ranges=ranges, spec=scan.spec)
+            view = from_scan(longer_scan, np.zeros(3), CONFIG)
+            evidence = look(network, 0.3, view, np.zeros(3), (0.2, 0.0), turn)
             shared, paired = shared + evidence.shared, paired + evidence.paired
         totals[name] = shared / paired
     assert abs(totals["noise"]) < 0.003**2
@@ -182,13 +205,7 @@ def corrected(
     gain = np.linalg.solve(information + np.linalg.inv(prediction.prior), information)
     odometry_noise.learn(
         prediction,
-        Match(
-            T_map_robot=prediction.T_map_robot + gain @ e,
-            information=information,
-            matched=1.0,
-            score=0.0,
-            tau=1.0,
-        ),
+        matched(information, prediction.T_map_robot + gain @ e),
         SIGMA_M,
     )
     return odometry_noise.nis
@@ -227,9 +244,7 @@ def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
                 twist=np.zeros(3),
                 elapsed=0.2,
             )
-            blind = Match(
-                T_map_robot=predicted, information=np.zeros((3, 3)), matched=0.0, score=0.0, tau=0.0
-            )
+            blind = matched(np.zeros((3, 3)), predicted)
             pose_covariance.update(estimate, prediction, blind, None)
             estimate = predicted
             truth = se2.compose(truth, increment + root @ rng.normal(size=3))
@@ -243,30 +258,12 @@ def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
     """Covariances of a robot that stands and sees the same surfaces, after 300 and 600 scans."""
     geometry = np.diag([0.5, 0.5, 4.0])
     pose_covariance = PoseCovariance(ShuntingConfig())
-    evidence = Evidence(
-        geometry=20.0 * geometry,
-        weighed=20.0,
-        in_view=in_view,
-        shared=20.0 * shared_m**2,
-        paired=20.0,
-        feigned=0.0,
-        new=0.0,
-        new_geometry=np.zeros(3),
-    )
-    still = Prediction(
-        T_map_robot=np.zeros(3),
-        increment=np.zeros(3),
-        covariance=np.diag([0.002**2, 0.002**2, 0.001**2]),
-        twist=np.zeros(3),
-        elapsed=0.2,
-    )
-    match = Match(
-        T_map_robot=np.zeros(3), information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0
-    )
+    evidence = seen(geometry, in_view=in_view, shared=20.0 * shared_m**2)
+    still, match = moved(0.002, 0.002, 0.001), matched(1e5 * geometry)
     out = []
     for _ in range(2):
         for _ in range(300):
-            pose_covariance.update(np.zeros(3), still, match, evidence)
+            pose_covariance.update(ZERO, still, match, evidence)
         out.append(pose_covariance.covariance.copy())
     return out[0], out[1]
 
@@ -293,32 +290,13 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
     left = {}
     for new in (0.0, 0.2):
         pose_covariance = PoseCovariance(ShuntingConfig())
-        T = np.zeros(3)
-        drive = Prediction(
-            T_map_robot=T,
-            increment=np.zeros(3),
-            covariance=np.diag([0.01**2, 0.01**2, 0.01**2]),
-            twist=np.zeros(3),
-            elapsed=0.2,
-        )
-        nothing = Match(
-            T_map_robot=T, information=np.zeros((3, 3)), matched=0.0, score=0.0, tau=0.0
-        )
-        match = Match(T_map_robot=T, information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0)
+        drive = moved(0.01, 0.01, 0.01)
         for _ in range(100):
-            pose_covariance.update(T, drive, nothing, None)
+            pose_covariance.update(ZERO, drive, matched(np.zeros((3, 3))), None)
         blind = pose_covariance.covariance[0, 0]
-        evidence = Evidence(
-            geometry=20.0 * geometry,
-            weighed=20.0,
-            in_view=75.0,
-            shared=0.0,
-            paired=20.0,
-            feigned=0.0,
-            new=20.0 * new,
-            new_geometry=20.0 * new * np.array([0.5, 0.0, 0.5]),
-        )
-        pose_covariance.update(T, drive, match, evidence)
+        fresh = 20.0 * new * np.array([0.5, 0.0, 0.5])
+        evidence = seen(geometry, new=20.0 * new, new_geometry=fresh)
+        pose_covariance.update(ZERO, drive, matched(1e5 * geometry), evidence)
         left[new] = pose_covariance.covariance[0, 0] / blind
         assert np.linalg.eigvalsh(pose_covariance.covariance)[0] > 0.0
     assert left[0.0] < 0.05
@@ -328,24 +306,16 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
 def test_a_new_end_wall_does_not_tell_how_far_the_robot_has_come() -> None:
     """At the end of a bare corridor only what was never seen before fixes the position along it:
     odometry's error stays. An end wall of old takes it away."""
-    T, sigma_m, steps = np.zeros(3), 0.01, 100
-    drive = Prediction(
-        T_map_robot=T, increment=T, covariance=np.diag([sigma_m**2, sigma_m**2, 1e-8]), twist=T,
-        elapsed=0.1,
-    )  # fmt: skip
+    sigma_m, steps = 0.01, 100
+    drive = moved(sigma_m, sigma_m, 1e-4, elapsed=0.1)
     walls, both = np.diag([0.0, 1.0, 4.0]), np.diag([0.3, 0.7, 4.0])
     left = {}
     for new in (0.0, 1.0):  # share of the end wall that is new
         pose_covariance = PoseCovariance(ShuntingConfig())
 
         def see(geometry: Float, new: float, to: PoseCovariance = pose_covariance) -> None:
-            match = Match(
-                T_map_robot=T, information=1e5 * geometry, matched=1.0, score=0.0, tau=5.0
-            )
-            to.update(T, drive, match, Evidence(
-                geometry=20.0 * geometry, weighed=20.0, in_view=75.0, shared=0.0, paired=20.0,
-                feigned=0.0, new=0.0, new_geometry=20.0 * np.array([new * geometry[0, 0], 0, 0]),
-            ))  # fmt: skip
+            fresh = seen(geometry, new_geometry=20.0 * np.array([new * geometry[0, 0], 0, 0]))
+            to.update(ZERO, drive, matched(1e5 * geometry), fresh)
 
         for _ in range(steps):
             see(walls, 0.0)
@@ -369,9 +339,7 @@ def test_a_corridor_tells_odometrys_noise_across_it() -> None:
         prediction = noise.predict(np.zeros(3), before, now)
         truth = prediction.T_map_robot.copy()
         truth[1] += 0.01 * rng.normal()  # a fifth of the step; a tenth is assumed
-        information = np.diag([0.0, 1e8, 1e8])
-        match = Match(T_map_robot=truth, information=information, matched=1.0, score=0.0, tau=1.0)
-        noise.learn(prediction, match, 0.01, along_rad=0.0)
+        noise.learn(prediction, matched(np.diag([0.0, 1e8, 1e8]), truth), 0.01, along_rad=0.0)
         before = now
     assert noise.scales[0] == pytest.approx(4.0, rel=0.4)
 
@@ -379,29 +347,12 @@ def test_a_corridor_tells_odometrys_noise_across_it() -> None:
 @pytest.mark.parametrize("blind_s", [700.0, 16000.0])
 def test_long_blindness_leaves_a_covariance_that_can_be(blind_s: float) -> None:
     """Faded sums come to stand at the smallest numbers there are; they must count as nothing."""
-    pose_covariance, T = PoseCovariance(CONFIG), np.zeros(3)
-    nothing = Evidence(
-        geometry=np.zeros((3, 3)),
-        weighed=0.0,
-        in_view=0.0,
-        shared=0.0,
-        paired=0.0,
-        feigned=0.0,
-        new=0.0,
-        new_geometry=np.zeros(3),
-    )
-    still = Prediction(
-        T_map_robot=T,
-        increment=T,
-        covariance=np.diag([1e-6, 1e-6, 1e-6]),
-        twist=T,
-        elapsed=0.5,
-    )
-    match = Match(T_map_robot=T, information=1e4 * np.eye(3), matched=1.0, score=0.0, tau=1.0)
-    seen = dataclasses.replace(nothing, geometry=np.eye(3), weighed=1.0, in_view=75.0)
-    pose_covariance.update(T, still, match, seen)
+    pose_covariance = PoseCovariance(CONFIG)
+    nothing = seen(np.zeros((3, 3)), 0.0, in_view=0.0)
+    still, match = moved(1e-3, 1e-3, 1e-3, elapsed=0.5), matched(1e4 * np.eye(3))
+    pose_covariance.update(ZERO, still, match, seen(np.eye(3), 1.0, paired=0.0))
     for _ in range(round(blind_s / still.elapsed)):
-        pose_covariance.update(T, still, match, nothing)
+        pose_covariance.update(ZERO, still, match, nothing)
     assert np.isfinite(pose_covariance.covariance).all()
     assert pose_covariance.shared_m2 < 1e-4
 
