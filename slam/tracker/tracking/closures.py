@@ -32,7 +32,7 @@ from slam.tracker.uncertainty.covariances import carried, observable
 from slam.tracker.uncertainty.residuals import look
 
 # What things cost, in units of drawing one key frame; measured on logs of 5 cm, 180 and 361 beams.
-UNIT_NS = 200_000
+UNIT_NS = 400_000  # of the counted price of a search, which is that of a slower machine
 DRAWN = 1  # the unit
 MATCHED, MATCHED_POINTS = 2, 60  # and one for so many points
 PIECE = 0.05  # of a scan's budget: after that a search pauses

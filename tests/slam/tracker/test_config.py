@@ -21,8 +21,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("4c60ccbcd994", "fb465883f12d")),
-        (OccupancyConfig, ["grid"], ("93940f5c9d43", "2306e52575b8")),
+        (ShuntingConfig, [], ("0ef57c0d35a2", "89d0d5d98c10")),
+        (OccupancyConfig, ["grid"], ("6bc11616c1cb", "43a58aeb0919")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
