@@ -78,7 +78,7 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
-    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, size)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             if cells.directory[row, column] >= 0:
@@ -117,7 +117,7 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
     half = 0.71 * size
-    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, size)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             slot = cells.directory[row, column]

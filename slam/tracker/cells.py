@@ -175,13 +175,35 @@ def forget_impressions(cells: Cells) -> None:
 
 @inner
 def in_reach(
-    cells: Cells, view: View, ox: float, oy: float, size: float
+    cells: Cells, view: View, T_map_laser: NDArray[np.float64], size: float
 ) -> tuple[int, int, int, int]:
-    """Directory rows and columns (first, past the last, each) that the view may reach."""
+    """Directory rows and columns (first, past the last, each) of the blocks that are touched, or
+    not hidden from the view: their centres are at most half a block beyond a free range, and that
+    and two bins beside it.
+    """
+    half = 0.71 * size
+    x0 = y0 = -2.0 * half
+    x1 = y1 = 2.0 * half
+    c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
+    cos_step, sin_step = math.cos(view.step), math.sin(view.step)
+    for k in range(len(view.limit)):
+        r = view.limit[k] + half
+        x, y, aside = r * c, r * s, 1.1 * half + 2.5 * view.step * r
+        x0, x1 = min(x0, x - aside), max(x1, x + aside)
+        y0, y1 = min(y0, y - aside), max(y1, y + aside)
+        c, s = c * cos_step - s * sin_step, s * cos_step + c * sin_step
+    column0 = math.floor((T_map_laser[0] + x0) / size) - 1
+    column1 = math.floor((T_map_laser[0] + x1) / size) + 2
+    row0 = math.floor((T_map_laser[1] + y0) / size) - 1
+    row1 = math.floor((T_map_laser[1] + y1) / size) + 2
+    for k in range(cells.counts[TOUCHED_COUNT]):
+        column0 = min(column0, cells.touched[k, 1])
+        column1 = max(column1, cells.touched[k, 1] + 1)
+        row0, row1 = min(row0, cells.touched[k, 2]), max(row1, cells.touched[k, 2] + 1)
     rows, columns = cells.directory.shape
     return (
-        max(0, math.floor((oy - view.farthest) / size) - cells.corner[1] - 1),
-        min(rows, math.floor((oy + view.farthest) / size) - cells.corner[1] + 2),
-        max(0, math.floor((ox - view.farthest) / size) - cells.corner[0] - 1),
-        min(columns, math.floor((ox + view.farthest) / size) - cells.corner[0] + 2),
+        max(0, row0 - cells.corner[1]),
+        min(rows, row1 - cells.corner[1]),
+        max(0, column0 - cells.corner[0]),
+        min(columns, column1 - cells.corner[0]),
     )

@@ -119,10 +119,18 @@ class Tracker(abc.ABC):
         return self._report(frame, match, self._belief.first(observations))
 
     def _correct(self) -> None:
-        """Search for loops; move into the map that they have corrected, if it is ready."""
+        """Search for loops; move into the map that they have corrected, if it is ready.
+
+        Not while the robot is searched for, which takes the time of a scan.
+        """
         self._path.moved_by = np.zeros(3)
+        if not self._belief.certain:
+            return
+        error = self._loops.map_error(len(self._path) - 1)
+        if error is not None:
+            self._pose_covariance.known(error)
         self._loops.work()
-        if not self._trusted or not self._belief.certain:
+        if not self._trusted:
             return
         correction = self._loops.correction(self._path.poses)
         if correction is None:
@@ -231,9 +239,6 @@ class Tracker(abc.ABC):
             len(self._path), match.T_map_robot, motion, covariance, everyone,
             elapsed=prediction.elapsed, written=state is State.TRACKING, found=found,
         )  # fmt: skip
-        error = self._loops.map_error(len(self._path))
-        if error is not None:
-            self._pose_covariance.known(error)
 
     def _report(
         self, frame: Frame, match: Match, state: State, trust: float = 1.0,

@@ -101,7 +101,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
     half = 0.71 * size
-    first_row, last_row, first_column, last_column = in_reach(cells, view, ox, oy, size)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, size)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             slot = cells.directory[row, column]

@@ -1,20 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Branch and bound over headings and offsets on a lattice, on one thread or several.
+"""Branch and bound over headings and offsets on a lattice.
 
-Of equally good candidates the one of the lowest heading, then row, then column is taken, and the
-work is split in the same parts whatever the number of threads: so is the result always the same.
+Of equally good candidates the one of the lowest heading, then row, then column is taken.
 """
 
 from __future__ import annotations
 
 import math
-import os
-from collections.abc import Callable, Iterable
-from concurrent.futures import ThreadPoolExecutor
-from dataclasses import dataclass, replace
-from functools import partial
-from itertools import pairwise
-from typing import TypeVar
+from dataclasses import dataclass
 
 import numpy as np
 from numpy.typing import NDArray
@@ -22,79 +15,91 @@ from numpy.typing import NDArray
 from slam._jit import inner, njit
 from slam.frames import Float
 
-SPAN = 8  # a block of 8 x 8 offsets is scored at once
-LEVEL = 3  # of such a block
-PARTS = 8  # the headings are dealt out to so many searches
-WORTH_THREADS = 3_000_000  # look-ups, some ms; fewer are done before the threads have started
-S = TypeVar("S")
-T = TypeVar("T")
-NOTHING_TAKEN = np.zeros((0, 3))
+SPAN = 8  # a block of 8 x 8 offsets is bounded, and scored, at once
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Lattice:
     """What is searched.
 
-    levels     (L + 1, rows, columns) uint8; level l holds maxima over 2^l x 2^l forward neighbours
+    field      (rows, columns) uint8; ``ahead`` its maxima over the 8 x 8 neighbours from each on
     bases      (headings, n, 2) int32 columns and rows of the points at offset (0, 0)
     turns      (headings,) rad from the prediction
     reach      offsets go from -reach to reach, cells
     pitch      m between two offsets
     precision  (3, 3) of the prior
     gain       score of a sum of 1
-    apart      cells and rad: a candidate must differ from those taken by one of them
     """
 
-    levels: NDArray[np.uint8]
+    field: NDArray[np.uint8]
+    ahead: NDArray[np.uint8]
     bases: NDArray[np.int32]
     turns: Float
     reach: int
     pitch: float
     precision: Float
     gain: float
-    apart: tuple[float, float] = (0.0, 0.0)
 
 
 @dataclass(frozen=True, kw_only=True)
 class Found:
-    """The best candidate; ``heading`` -1 where none scores above the floor."""
+    """The best candidate, and how many were scored or bounded."""
 
     score: float
-    heading: int = -1
-    column: int = 0
-    row: int = 0
-    evaluations: int = 0
-
-    def better_than(self, other: Found) -> bool:
-        """Higher, or as high and first."""
-        if self.heading < 0 or self.score != other.score:
-            return self.heading >= 0 and self.score > other.score
-        mine = (self.heading, self.row, self.column)
-        return other.heading < 0 or mine < (other.heading, other.row, other.column)
+    heading: int
+    column: int
+    row: int
+    evaluations: int
 
 
-def levels_of(field: NDArray[np.uint8], depth: int) -> NDArray[np.uint8]:
-    """(depth + 1, rows, columns): level l is the maximum over l's 2^l x 2^l forward neighbours."""
-    levels = np.empty((depth + 1, *field.shape), np.uint8)
-    levels[0] = field
-    for level in range(depth):
-        span = 1 << level
-        before, after = levels[level], levels[level + 1]
-        wide = np.empty_like(before)
-        np.maximum(before[:, :-span], before[:, span:], out=wide[:, :-span])
-        wide[:, -span:] = before[:, -span:]
-        np.maximum(wide[:-span], wide[span:], out=after[:-span])
-        after[-span:] = wide[-span:]
-    return levels
+def look_ahead(field: NDArray[np.uint8], ahead: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    """``ahead``, which is all 0, with the largest of the 8 x 8 values of ``field`` from each one
+    on; the last rows and columns have fewer.
+
+    ``field`` has a whole number of blocks of columns. Where it is empty, no work is done.
+    """
+    _look_ahead(field, field.view(np.uint64), ahead)
+    return ahead
 
 
-@inner
-def _sum(level: NDArray[np.uint8], base: NDArray[np.int32], di: int, dj: int) -> int:
-    """Sum of the level's values under the points (n, 2: column, row) shifted by (di, dj)."""
-    total = 0
-    for k in range(len(base)):
-        total += level[base[k, 1] + dj, base[k, 0] + di]
-    return total
+@njit
+def _look_ahead(  # noqa: C901 (kernel)
+    field: NDArray[np.uint8], words: NDArray[np.uint64], ahead: NDArray[np.uint8]
+) -> None:
+    """``words``: eight values of ``field`` in one, which show at once where nothing is."""
+    rows = len(field)
+    strip = np.empty((SPAN, 2 * SPAN - 1), np.uint8)
+    for top in range(0, rows, SPAN):
+        high = min(SPAN, rows - top)
+        for word in range(words.shape[1]):
+            some = words[top, word]
+            for r in range(top + 1, top + high):
+                some |= words[r, word]
+            if some == 0:
+                continue
+            left = word * SPAN
+            for r in range(high):  # along the rows: from 7 columns before the block to its last
+                row, largest = field[top + r], np.uint8(0)
+                for c in range(SPAN):
+                    largest = max(largest, row[left + c])
+                    strip[r, c] = largest
+                largest = np.uint8(0)
+                for c in range(SPAN - 1, 0, -1):
+                    largest = max(largest, row[left + c])
+                    strip[r, SPAN - 1 + c] = largest
+            for c in range(max(0, SPAN - 1 - left), 2 * SPAN - 1):
+                column = left + c - SPAN + 1
+                largest = np.uint8(0)
+                for r in range(SPAN - 1):  # down to each row that looks at the block's first ones
+                    if r < high:
+                        largest = max(largest, strip[r, c])
+                    into = top + r - SPAN + 1
+                    if into >= 0:
+                        ahead[into, column] = max(ahead[into, column], largest)
+                largest = np.uint8(0)
+                for r in range(high - 1, -1, -1):
+                    largest = max(largest, strip[r, c])
+                    ahead[top + r, column] = max(ahead[top + r, column], largest)
 
 
 @inner
@@ -126,40 +131,27 @@ def open_block(
 
 
 @njit
-def _bound(  # noqa: PLR0913 (kernel)
-    level: NDArray[np.uint8],
+def _bound(
+    ahead: NDArray[np.uint8],
     bases: NDArray[np.int32],
     costs: NDArray[np.float64],
     reach: int,
-    width: int,
     gain: float,
     bounds: NDArray[np.float64],
 ) -> None:
-    """Upper bounds (headings, rows, columns) of the coarsest blocks of offsets."""
+    """Upper bounds (headings, rows, columns) of the blocks of offsets."""
     for h in range(bounds.shape[0]):
         for a in range(bounds.shape[1]):
             for b in range(bounds.shape[2]):
-                total = _sum(level, bases[h], b * width - reach, a * width - reach)
+                di, dj, total = b * SPAN - reach, a * SPAN - reach, 0
+                for k in range(bases.shape[1]):
+                    total += ahead[bases[h, k, 1] + dj, bases[h, k, 0] + di]
                 bounds[h, a, b] = gain * total - costs[h]
 
 
 @inner
-def is_apart(
-    taken: NDArray[np.float64], apart: tuple[float, float], column: int, row: int, turn: float
-) -> bool:
-    """Whether a candidate differs from all that were taken, (n, 3) by column, row and turn."""
-    for k in range(len(taken)):
-        off = turn - taken[k, 2]
-        off -= math.tau * math.floor(off / math.tau + 0.5)
-        di, dj = column - taken[k, 0], row - taken[k, 1]
-        if abs(off) < apart[1] and di * di + dj * dj < apart[0] * apart[0]:
-            return False
-    return True
-
-
-@inner
 def _first(index: NDArray[np.int64], heading: int, row: int, column: int) -> bool:
-    """Whether a candidate comes before that of the index; False where there is none."""
+    """Whether a candidate comes before that of the index."""
     if heading != index[0]:
         return bool(heading < index[0])
     return bool(row < index[1] or (row == index[1] and column < index[2]))
@@ -179,97 +171,43 @@ def _cost(
 
 
 @njit
-def _descend(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
-    levels: NDArray[np.uint8],
+def _descend(  # noqa: PLR0913 (kernel)
+    field: NDArray[np.uint8],
     bases: NDArray[np.int32],
     turns: NDArray[np.float64],
-    costs: NDArray[np.float64],
     reach: int,
     pitch: float,
     precision: NDArray[np.float64],
     gain: float,
-    taken: NDArray[np.float64],
-    apart: tuple[float, float],
     bounds: NDArray[np.float64],
     order: NDArray[np.int64],
-    best: float,
     index: NDArray[np.int64],
 ) -> tuple[float, int]:
-    """Depth first through the blocks in falling ``order`` of their bounds.
+    """Open blocks in falling ``order`` of their bounds, as long as one may hold a better candidate.
 
-    ``best`` and ``index`` (heading, row, column; heading -1: none yet) are what must be beaten; the
-    index is changed in place. Returns the score and how many candidates were scored.
+    Returns the best score, and how many candidates were scored; ``index`` (3,) becomes the
+    heading, row and column of the best.
     """
-    top = len(levels) - 1
-    across = bounds.shape[1]
-    evaluations = 0
-    stack = np.empty((4 * (top + 1) + 4, 3), np.int64)  # di, dj, level
-    stack_bound = np.empty(4 * (top + 1) + 4)
-    children = np.empty(4)
-    field, columns = levels[0].ravel(), levels.shape[2]
+    across, columns = bounds.shape[1], field.shape[1]
+    best, evaluations = -math.inf, 0
+    cells = field.ravel()
     flat, sums = np.empty(bases.shape[1], np.uint64), np.empty((SPAN, SPAN), np.int64)
     for entry in order:
         h, rest = entry // (across * across), entry % (across * across)
-        bound = bounds[h, rest // across, rest % across]
-        if bound < best or (bound == best and index[0] < 0):
+        if bounds[h, rest // across, rest % across] < best:
             break
-        depth = 1
-        stack[0, 0] = (rest % across) * (1 << top) - reach
-        stack[0, 1] = (rest // across) * (1 << top) - reach
-        stack[0, 2] = top
-        stack_bound[0] = bound
-        while depth > 0:
-            depth -= 1
-            di, dj, level = stack[depth, 0], stack[depth, 1], stack[depth, 2]
-            score = stack_bound[depth]
-            if score < best or (score == best and index[0] < 0):
-                continue
-            if level == LEVEL:
-                for k in range(bases.shape[1]):
-                    flat[k] = bases[h, k, 1] * columns + bases[h, k, 0]
-                open_block(field, flat, dj * columns + di, columns, sums)
-                evaluations += SPAN * SPAN
-                for a in range(min(SPAN, reach - dj + 1)):
-                    for b in range(min(SPAN, reach - di + 1)):
-                        i, j = di + b, dj + a
-                        score = gain * sums[a, b] - _cost(precision, pitch, i, j, turns[h])
-                        if (score > best or (score == best and _first(index, h, j, i))) and (
-                            is_apart(taken, apart, i, j, turns[h])
-                        ):
-                            best = score
-                            index[0], index[1], index[2] = h, j, i
-                continue
-            if level == 0:
-                if (score > best or _first(index, h, dj, di)) and (
-                    is_apart(taken, apart, di, dj, turns[h])
-                ):
+        di, dj = rest % across * SPAN - reach, rest // across * SPAN - reach
+        for k in range(bases.shape[1]):
+            flat[k] = bases[h, k, 1] * columns + bases[h, k, 0]
+        open_block(cells, flat, dj * columns + di, columns, sums)
+        evaluations += SPAN * SPAN
+        for a in range(min(SPAN, reach - dj + 1)):
+            for b in range(min(SPAN, reach - di + 1)):
+                i, j = di + b, dj + a
+                score = gain * sums[a, b] - _cost(precision, pitch, i, j, turns[h])
+                if score > best or (score == best and _first(index, h, j, i)):
                     best = score
-                    index[0], index[1], index[2] = h, dj, di
-                continue
-            span = 1 << (level - 1)
-            for q in range(4):
-                i, j = di + (q & 1) * span, dj + (q >> 1) * span
-                children[q] = -math.inf
-                if i > reach or j > reach:
-                    continue
-                evaluations += 1
-                value = gain * _sum(levels[level - 1], bases[h], i, j)
-                if level == 1:
-                    children[q] = value - _cost(precision, pitch, i, j, turns[h])
-                else:
-                    children[q] = value - costs[h]
-            for _ in range(4):  # the best is pushed last
-                least = 0
-                for q in range(1, 4):
-                    if children[q] < children[least]:
-                        least = q
-                if best <= children[least] < math.inf:
-                    stack[depth, 0] = di + (least & 1) * span
-                    stack[depth, 1] = dj + (least >> 1) * span
-                    stack[depth, 2] = level - 1
-                    stack_bound[depth] = children[least]
-                    depth += 1
-                children[least] = math.inf
+                    index[0], index[1], index[2] = h, j, i
     return best, evaluations
 
 
@@ -285,60 +223,18 @@ def _heading_costs(precision: Float, turns: Float) -> Float:
     return costs
 
 
-class Search:
-    """Bounds of one lattice, and searches in it, on at most so many threads (None: processors)."""
-
-    def __init__(self, lattice: Lattice, threads: int | None = None) -> None:
-        self.lattice = lattice
-        width = 1 << (len(lattice.levels) - 1)
-        across = (2 * lattice.reach) // width + 1
-        headings, points, _ = lattice.bases.shape
-        worth = headings * across * across * points >= WORTH_THREADS
-        self._parts = PARTS if worth else 1
-        self._threads = min(_processors() if threads is None else threads, self._parts)
-        self._costs = _heading_costs(lattice.precision, lattice.turns)
-        self._bounds = np.empty((headings, across, across))
-        edges = [k * headings // self._parts for k in range(self._parts + 1)]
-
-        def bound(part: slice) -> None:
-            _bound(lattice.levels[-1], lattice.bases[part], self._costs[part], lattice.reach, width,
-                   lattice.gain, self._bounds[part])  # fmt: skip
-
-        _each(bound, [slice(*edge) for edge in pairwise(edges)], self._threads)
-        self._order = np.argsort(-self._bounds.ravel(), kind="stable")
-
-    def best(self, floor: float = -math.inf, taken: Float = NOTHING_TAKEN) -> Found:
-        """The best candidate above ``floor`` that is apart from those ``taken``."""
-        seed = self._descended(self._order[:1], Found(score=floor), taken)
-        across = self._bounds.shape[1]
-        of_part = (self._order // (across * across)) % self._parts
-        parts = [self._order[of_part == k] for k in range(self._parts)]
-        found = _each(partial(self._descended, start=seed, taken=taken), parts, self._threads)
-        best = seed
-        for one in found:
-            best = one if one.better_than(best) else best
-        total = self._bounds.size + seed.evaluations + sum(one.evaluations for one in found)
-        return replace(best, evaluations=total)
-
-    def _descended(self, order: NDArray[np.int64], start: Found, taken: Float) -> Found:
-        of, index = self.lattice, np.array([start.heading, start.row, start.column])
-        score, evaluations = _descend(
-            of.levels, of.bases, of.turns, self._costs, of.reach, of.pitch, of.precision, of.gain,
-            taken, of.apart, self._bounds, order, start.score, index,
-        )  # fmt: skip
-        h, row, column = index.tolist()
-        return Found(score=score, heading=h, row=row, column=column, evaluations=evaluations)
-
-
-def _processors() -> int:
-    if hasattr(os, "sched_getaffinity"):
-        return len(os.sched_getaffinity(0))
-    return os.cpu_count() or 1
-
-
-def _each(work: Callable[[S], T], parts: Iterable[S], threads: int) -> list[T]:
-    """``work`` done on each part, in order; the kernels release the interpreter's lock."""
-    if threads == 1:
-        return [work(part) for part in parts]
-    with ThreadPoolExecutor(threads) as pool:  # made anew: one would not survive a fork
-        return list(pool.map(work, parts))
+def best_of(of: Lattice) -> Found:
+    """The best candidate of a lattice."""
+    across, index = 2 * of.reach // SPAN + 1, np.zeros(3, np.int64)
+    bounds = np.empty((len(of.turns), across, across))
+    costs = _heading_costs(of.precision, of.turns)
+    _bound(of.ahead, of.bases, costs, of.reach, of.gain, bounds)
+    order = np.argsort(-bounds.ravel(), kind="stable")
+    score, scored = _descend(
+        of.field, of.bases, of.turns, of.reach, of.pitch, of.precision, of.gain,
+        bounds, order, index,
+    )  # fmt: skip
+    heading, row, column = index.tolist()
+    return Found(
+        score=score, heading=heading, row=row, column=column, evaluations=bounds.size + scored
+    )

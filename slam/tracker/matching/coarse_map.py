@@ -13,9 +13,9 @@ from numpy.typing import NDArray
 
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import SHIFT, SIDE
+from slam.tracker.matching.branch_and_bound import look_ahead
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.config import BudgetConfig
-from slam.tracker.matching.global_search import pooled, pooling, spread
 from slam.tracker.matching.local_search import field_of
 from slam.tracker.matching.planes import SPAN
 
@@ -35,14 +35,17 @@ class CoarseMap:
     widest   which of them bounds the coarsest blocks of a search
     """
 
-    def __init__(self, cell_map: CellMap, short_term: float) -> None:
+    def __init__(self, cell_map: CellMap, short_term: float, room_m: float = 0.0) -> None:
+        """``room_m`` about the map's origin there is room for a search, whatever lives there."""
         config = cell_map.config.matching.whole
         self._cell_map, self._short_term, self._config = cell_map, short_term, config
-        extent = cell_map.extent()
         self._pool = pooling(cell_map.cell, config.pitch_m)
         self.pitch = self._pool * cell_map.cell
-        self._extent = extent or (0, 0, 0, 0)
-        i0, j0, i1, j1 = self._extent
+        i0, j0, i1, j1 = cell_map.extent() or (0, 0, 0, 0)
+        if i0 < i1:
+            room = math.ceil(room_m / (SIDE * cell_map.cell)) * SIDE
+            i0, j0, i1, j1 = min(i0, -room), min(j0, -room), max(i1, room), max(j1, room)
+        self._extent = i0, j0, i1, j1
         self.shape = ((j1 - j0) // self._pool, (i1 - i0) // self._pool)
         self.margin = math.ceil(config.far_m / self.pitch) + 2
         self.corner = (i0 // self._pool - self.margin, j0 // self._pool - self.margin)
@@ -64,7 +67,8 @@ class CoarseMap:
         for j in range(0, j1 - j0, TILE[0]):
             for i in range(0, i1 - i0, TILE[1]):
                 row, column = top + (j >> SHIFT), left + (i >> SHIFT)
-                tile = np.s_[row : row + TILE[0] // SIDE, column : column + TILE[1] // SIDE]
+                down = slice(max(row, 0), max(row + TILE[0] // SIDE, 0))
+                tile = down, slice(max(column, 0), max(column + TILE[1] // SIDE, 0))
                 if (cells.directory[tile] >= 0).any():
                     steps.append(("tile", j, i))
         rows = self.shape[0]
@@ -97,7 +101,8 @@ class CoarseMap:
         """Pool a tile of the map; its price."""
         i0, j0, i1, j1 = self._extent
         rows, columns = min(TILE[0], j1 - j0 - j), min(TILE[1], i1 - i0 - i)
-        fine = field_of(self._cell_map, self._short_term, i0 + i, j0 + j, rows, columns)
+        fine = np.zeros((rows, columns), np.uint8)
+        field_of(self._cell_map, self._short_term, i0 + i, j0 + j, fine)
         pool = self._pool
         into = np.s_[j // pool : (j + rows) // pool, i // pool : (i + columns) // pool]
         self._coarse[into] = pooled(fine, pool)
@@ -114,7 +119,7 @@ class CoarseMap:
     def _eights(self, row: int, end: int, prices: BudgetConfig) -> float:
         """Maxima of 8 x 8 cells, for rows of blocks."""
         source = self.planes[0][0, 0, row * SPAN : end * SPAN + SPAN - 1]
-        largest = _ahead(source, 1)[: (end - row) * SPAN]
+        largest = look_ahead(source, np.zeros_like(source))[: (end - row) * SPAN]
         plane = self.planes[1]
         blocks = largest.reshape(end - row, SPAN, plane.shape[3], SPAN)
         plane[:, :, row:end] = blocks.transpose(1, 3, 0, 2)
@@ -122,18 +127,33 @@ class CoarseMap:
 
     def _wide(self, row: int, column: int, prices: BudgetConfig) -> float:
         """Maxima of 64 x 64 cells, of one phase of those of 8 x 8."""
-        largest, plane = _ahead(self.planes[1][row, column], 1), self.planes[2]
+        source, plane = self.planes[1][row, column], self.planes[2]
+        largest = look_ahead(source, np.zeros_like(source))
         blocks = largest.reshape(plane.shape[2], SPAN, plane.shape[3], SPAN)
         # a cell's phase among 64: of eights times 8, plus that among 8
         plane[row::SPAN, column::SPAN] = blocks.transpose(1, 3, 0, 2)
         return prices.cell_ns * largest.size
 
 
-def _ahead(source: NDArray[np.uint8], span: int) -> NDArray[np.uint8]:
-    """The largest of the 8 x 8 values from each one on; the last rows and columns have fewer."""
-    largest = source.copy()
-    while span < SPAN:
-        np.maximum(largest[:-span], largest[span:], out=largest[:-span])
-        np.maximum(largest[:, :-span], largest[:, span:], out=largest[:, :-span])
-        span *= 2
+def pooled(fine: NDArray[np.uint8], pool: int) -> NDArray[np.uint8]:
+    """The largest of ``pool`` x ``pool`` neighbouring values."""
+    rows, columns = fine.shape
+    blocks = fine.reshape(rows // pool, pool, columns // pool, pool)
+    largest: NDArray[np.uint8] = blocks.max(axis=(1, 3))
     return largest
+
+
+def spread(source: NDArray[np.uint8], beside: float) -> NDArray[np.uint8]:
+    """The source, or ``beside`` times the largest of the eight values around."""
+    padded = np.pad(source, 1)
+    wide = np.maximum(np.maximum(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])
+    around = np.maximum(np.maximum(wide[:-2], wide[1:-1]), wide[2:])
+    return np.maximum(source, (beside * around).astype(np.uint8))
+
+
+def pooling(cell: float, pitch_m: float) -> int:
+    """Cells that are pooled each way, a power of 2."""
+    pool = 1
+    while pool < SIDE and 2 * pool * cell <= 1.01 * pitch_m:
+        pool *= 2
+    return pool

@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Multi-resolution search for the pose in a wide window (section 3.4), by branch and bound.
 
-A field of smoothed activities in small integers is built once; its sliding maxima over 2, 4, 8
-cells bound the overlap of whole blocks of offsets from above. The prior enters a bound with what
+A field of smoothed activities in small integers is built once; its sliding maxima over 8 x 8 cells
+bound the overlap of whole blocks of offsets from above. The prior enters a bound with what
 its heading alone costs, so no bound is ever too low and the result equals exhaustive search.
 """
 
@@ -11,6 +11,7 @@ from __future__ import annotations
 import functools
 import math
 from dataclasses import dataclass
+from typing import Self
 
 import numpy as np
 from numpy.typing import NDArray
@@ -20,10 +21,10 @@ from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, no_cells
-from slam.tracker.matching.branch_and_bound import Lattice, Search, levels_of
+from slam.tracker.matching.branch_and_bound import SPAN, Lattice, best_of, look_ahead
 from slam.tracker.matching.config import LocalConfig
 
-LEVELS = 3  # coarsest block of offsets: 8 x 8 cells
+KEPT = 1 << 23  # bytes of a field that are kept for the next one
 FULL = 255.0  # integer that stands for the field's value 1
 
 
@@ -136,18 +137,18 @@ def _get_ready() -> None:
         _field(no_cells(), 0.3, 0, 0, _kernel(1.0), field)
         place(np.ones((1, 2)), np.zeros(3), np.zeros(1), 0.2, 0, 0, bases)
         lattice = Lattice(
-            levels=levels_of(field, 1), bases=bases, turns=np.zeros(1), reach=1, pitch=0.2,
+            field=field, ahead=field, bases=bases, turns=np.zeros(1), reach=1, pitch=0.2,
             precision=np.eye(3), gain=1.0,
         )  # fmt: skip
-        Search(lattice, threads=1).best()
+        best_of(lattice)
 
 
 def field_of(
-    cell_map: CellMap, short_term: float, i0: int, j0: int, rows: int, columns: int
+    cell_map: CellMap, short_term: float, i0: int, j0: int, field: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
-    """(rows, columns) smoothed activities from cell (i0, j0) on, which begins a block."""
+    """``field``, which is all 0, filled with smoothed activities from cell (i0, j0) on, which
+    begins a block."""
     _get_ready()
-    field = np.zeros((rows, columns), np.uint8)
     sigma = cell_map.config.frontend.sigma_cells
     _field(cell_map.cells, short_term, i0, j0, _kernel(sigma), field)
     return field
@@ -156,23 +157,35 @@ def field_of(
 class Around:
     """The map around a robot as one search after another wants it, while nothing is written."""
 
-    def __init__(self, cell_map: CellMap, short_term: float) -> None:
-        self._cell_map, self._short_term = cell_map, short_term
-        self._low, self._high = np.zeros(2, np.int64), np.zeros(2, np.int64)
-        self._levels = np.zeros((LEVELS + 1, 0, 0), np.uint8)
+    def __init__(self, short_term: float) -> None:
+        self._short_term = short_term
+        self._room = np.empty(0, np.uint8)  # used again: new pages take longer than the search
 
-    def levels(
+    def of(self, cell_map: CellMap) -> Self:
+        """Of this map, as it is now."""
+        self._cell_map = cell_map
+        self._low, self._high = np.zeros(2, np.int64), np.zeros(2, np.int64)
+        return self
+
+    def fields(
         self, low: NDArray[np.int32], high: NDArray[np.int32]
     ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
-        """Levels that hold the cells from ``low`` to ``high`` (column, row), and their corner."""
+        """Corner of a field that holds the cells from ``low`` to ``high`` (column, row); the field
+        and its maxima ahead (2, rows, columns)."""
         if (low < self._low).any() or (high >= self._high).any():
             first = low >> SHIFT
             blocks = (high >> SHIFT) + 1 - first
             self._low, self._high = first * SIDE, (first + blocks) * SIDE
             (i0, j0), (columns, rows) = self._low.tolist(), (blocks * SIDE).tolist()
-            field = field_of(self._cell_map, self._short_term, i0, j0, rows, columns)
-            self._levels = levels_of(field, LEVELS)
-        return self._low.astype(np.int32), self._levels
+            room = self._room
+            if len(room) < 2 * rows * columns:
+                room = np.empty(2 * rows * columns, np.uint8)
+                self._room = room if len(room) <= KEPT else self._room
+            self._fields = room[: 2 * rows * columns].reshape(2, rows, columns)
+            self._fields[:] = 0
+            field_of(self._cell_map, self._short_term, i0, j0, self._fields[0])
+            look_ahead(*self._fields)
+        return self._low.astype(np.int32), self._fields
 
 
 def headings(points: Float, window: SearchWindow, cell: float, config: LocalConfig) -> Float:
@@ -187,13 +200,12 @@ def headings(points: Float, window: SearchWindow, cell: float, config: LocalConf
 
 def search(  # noqa: PLR0913 (arrays of one problem)
     cell_map: CellMap,
-    short_term: float,
+    around: Around,
     observations: Observations,
     prediction: Float,
     precision: Float,
     window: SearchWindow,
     gain: float,
-    around: Around | None = None,
 ) -> tuple[Float, int]:
     """Best pose on the lattice of the window, and how many candidates were scored.
 
@@ -209,14 +221,16 @@ def search(  # noqa: PLR0913 (arrays of one problem)
     reach = math.ceil(window.reach_m / cell)
     bases = np.empty((len(turns), len(chosen), 2), np.int32)
     place(chosen, prediction, turns, cell, 0, 0, bases)
-    # Offsets may overshoot by a block of the coarsest level.
-    edge = reach + (1 << LEVELS) + 2
-    low, high = bases.min(axis=(0, 1)) - edge, bases.max(axis=(0, 1)) + edge
-    corner, levels = (around or Around(cell_map, short_term)).levels(low, high)
+    edge = reach + SPAN + 2  # offsets may overshoot by a block
+    columns, rows = bases[..., 0], bases[..., 1]  # one by one: a sixth of the time
+    low = np.array([columns.min(), rows.min()]) - edge
+    high = np.array([columns.max(), rows.max()]) + edge
+    corner, (field, ahead) = around.fields(low, high)
     bases -= corner
     scale = gain * float(observations.weights.mean()) * len(points) / len(chosen) / FULL
     lattice = Lattice(
-        levels=levels,
+        field=field,
+        ahead=ahead,
         bases=bases,
         turns=turns,
         reach=reach,
@@ -224,6 +238,6 @@ def search(  # noqa: PLR0913 (arrays of one problem)
         precision=precision,
         gain=scale,
     )
-    found = Search(lattice).best()
+    found = best_of(lattice)
     offset = np.array([found.column * cell, found.row * cell, turns[found.heading]])
     return prediction + offset, found.evaluations

@@ -22,6 +22,7 @@ from slam.frames import Float
 from slam.frontend import odometry_steps
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.tracker.belief.posterior import Odds
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.config import UsualConfig
@@ -215,26 +216,39 @@ class Matcher:
         self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
         self._scratch = np.empty(SCRATCH)
         self.usual = Usual(config.matching.usual)
+        self._odds = Odds(config.belief, config.carried_per_h)
+        self._around = Around(self.reward.short_term)
 
     def match(self, cell_map: CellMap, observations: Observations, prediction: Prediction) -> Match:
-        """Climb from the prediction; search around it when that is vague or finds too little."""
+        """Climb from the prediction; search around it when that is vague or finds too little.
+
+        Where too little is found, wheels may have slipped: it is searched as after a slip, and what
+        that finds has to be better by the price of a slip.
+        """
         predicted, prior = prediction.T_map_robot, prediction.prior
         precision = inverted(prior)
         start = self.approach(cell_map, observations, predicted, prior)
         match = self.climb(cell_map, observations, start, predicted, precision)
-        local = self.numbers.local
+        local, belief = self.numbers.local, self.config.belief
         good = local.good_share * self.usual.match
         vague_m = local.vague_cells * self.config.cell_m  # as far as the climb reaches
         vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > vague_m
         if not vague and match.matched >= good:
             return match
-        around = Around(cell_map, self.reward.short_term)
-        for window in (SearchWindow.about(prior, local), SearchWindow.widest(local)):
-            found = self.search(cell_map, observations, predicted, precision, window, around)
-            if found.score > match.score:
-                match = found
-            if match.matched >= local.widest_share * good:
-                break
+        near, widest = SearchWindow.about(prior, local), SearchWindow.widest(local)
+        slip = inverted(prior + np.diag([belief.slip_m**2, belief.slip_m**2, belief.slip_rad**2]))
+        slipped = self._odds.slipped(math.hypot(*prediction.increment[:2].tolist()), 0.0, 0.0)
+        around = self._around.of(cell_map)
+        for window, about, nats, enough in (
+            (near, precision, 0.0, math.inf if vague else 0.0),
+            (near, slip, slipped, good),
+            (widest, precision, 0.0, local.widest_share * good),
+        ):
+            if match.matched >= enough:
+                continue
+            found = self.search(cell_map, observations, predicted, about, window, around)
+            if found.score + nats > match.score:
+                match = replace(found, score=found.score + nats)
         return match
 
     def climb(
@@ -325,8 +339,8 @@ class Matcher:
         ``around``: what searches of the same frame laid out before.
         """
         start, evaluations = search(
-            cell_map, self.reward.short_term, observations, prediction, precision,
-            window, self.config.reward, around,
+            cell_map, around or self._around.of(cell_map), observations, prediction, precision,
+            window, self.config.reward,
         )  # fmt: skip
         match = self.climb(cell_map, observations, start, prediction, precision)
         return replace(match, searched=True, evaluations=evaluations)

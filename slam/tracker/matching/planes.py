@@ -9,6 +9,7 @@ w x w values from (r, c) on.
 
 from __future__ import annotations
 
+import math
 from typing import NamedTuple
 
 import numpy as np
@@ -17,7 +18,7 @@ from numpy.typing import NDArray
 from slam._jit import inner, njit
 from slam.frames import Float
 from slam.tracker.matching.branch_and_bound import SPAN as SPAN
-from slam.tracker.matching.branch_and_bound import is_apart, open_block
+from slam.tracker.matching.branch_and_bound import open_block
 
 LEAF = 3  # kinds of a node in the order in which they are opened; 0: 64 x 64 offsets, 1: 8 x 8
 KINDS = 4
@@ -121,6 +122,20 @@ def _drop(heap: NDArray[np.int64], size: int) -> None:
         heap[at, 0], heap[at, 1] = heap[child, 0], heap[child, 1]
         at = child
     heap[at, 0], heap[at, 1] = key, node
+
+
+@inner
+def is_apart(
+    taken: NDArray[np.float64], apart: tuple[float, float], column: int, row: int, turn: float
+) -> bool:
+    """Whether a candidate differs from all that were taken, (n, 3) by column, row and turn."""
+    for k in range(len(taken)):
+        off = turn - taken[k, 2]
+        off -= math.tau * math.floor(off / math.tau + 0.5)
+        di, dj = column - taken[k, 0], row - taken[k, 1]
+        if abs(off) < apart[1] and di * di + dj * dj < apart[0] * apart[0]:
+            return False
+    return True
 
 
 @njit

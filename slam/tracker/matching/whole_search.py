@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Search of the whole map over several scans, for the places from which one of them was seen.
 
-The answers are those of ``global_search.places``, in the same order, however the work is divided.
+The answers are the same, in the same order, however the work is divided.
 """
 
 from __future__ import annotations
@@ -16,7 +16,6 @@ from slam.tracker.matching import planes
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.config import GlobalConfig
-from slam.tracker.matching.global_search import headings
 from slam.tracker.matching.local_search import place
 from slam.tracker.matching.planes import LARGE, SPAN, Queue, bound_blocks, flatten, open_nodes
 
@@ -33,9 +32,20 @@ class WholeSearch:
     evaluations  candidates and blocks that were scored
     """
 
-    def __init__(self, coarse: CoarseMap, points_robot: Float, most: int, config: GlobalConfig):
-        """``points_robot`` (n, 2) of the scan; up to ``most`` answers."""
-        self._coarse, self._config, self._most = coarse, config, most
+    def __init__(
+        self,
+        coarse: CoarseMap,
+        points_robot: Float,
+        most: int,
+        config: GlobalConfig,
+        about: tuple[Float, float, float] | None = None,
+    ) -> None:
+        """``points_robot`` (n, 2) of the scan; up to ``most`` answers.
+
+        ``about`` limits them to a pose, so many m and so many rad around it, where the coarse map
+        has room.
+        """
+        self._coarse, self._config, self._most, self._about = coarse, config, most, about
         near = points_robot[(points_robot * points_robot).sum(axis=1) < config.far_m**2]
         self._points = np.ascontiguousarray(near[:: max(1, math.ceil(len(near) / config.points))])
         self.done = len(near) == 0 or coarse.empty
@@ -68,6 +78,12 @@ class WholeSearch:
         i0, j0 = (c + coarse.margin for c in coarse.corner)
         rows, columns = coarse.shape
         self._middle = np.array([i0 + 0.5 * columns, j0 + 0.5 * rows, 0.0]) * coarse.pitch
+        if self._about is not None:
+            self._middle, reach_m, turn_rad = self._about
+            step = float(self._turns[1])
+            half, reach = math.ceil(turn_rad / step), math.ceil(reach_m / coarse.pitch)
+            self._turns = step * np.arange(-half, half + 1, dtype=np.float64)
+            self._reach = reach, reach
         bases = np.empty((len(self._turns), len(self._points), 2), np.int32)
         place(self._points, self._middle, self._turns, coarse.pitch, *coarse.corner, bases)
         low = -self._reach[1], -self._reach[0]
@@ -167,3 +183,12 @@ class WholeSearch:
         first, self._given = self._given, int(self._queue.counts[planes.TAKEN])
         scale = np.array([self._coarse.pitch, self._coarse.pitch, 1.0])
         return [self._middle + offset * scale for offset in self._queue.taken[first : self._given]]
+
+
+def headings(points: Float, pitch: float, config: GlobalConfig) -> Float:
+    """Turns to try, rad: all round, so that a far point moves by about one pitch between two."""
+    distances = np.sort(np.sqrt((points * points).sum(axis=1)))
+    far = float(distances[(3 * len(distances)) // 4])
+    step = min(max(pitch / max(far, pitch), config.finest_rad), config.coarsest_rad)
+    count = math.ceil(math.tau / step)
+    return np.asarray(np.arange(count) * (math.tau / count), dtype=np.float64)

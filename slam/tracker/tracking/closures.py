@@ -12,7 +12,6 @@ import math
 from collections.abc import Callable, Generator, Iterable
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
 from slam.frames import Float
@@ -23,17 +22,20 @@ from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import coarse, spread
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
-from slam.tracker.matching.global_search import coarse_field, places
+from slam.tracker.matching.budget import Budget
+from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.matcher import Match, Matcher
+from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracking.keys import KeyFrame
 from slam.tracker.uncertainty.covariances import carried, observable
 from slam.tracker.uncertainty.residuals import look
 
-# What things cost, in units of drawing one key frame; measured on a log of 5 cm and 180 beams.
+# What things cost, in units of drawing one key frame; measured on logs of 5 cm, 180 and 361 beams.
+UNIT_NS = 200_000
 DRAWN = 1  # the unit
-MATCHED = 3
-SEARCHED = 16
+MATCHED, MATCHED_POINTS = 2, 60  # and one for so many points
+PIECE = 0.05  # of a scan's budget: after that a search pauses
 SAMPLES = 4  # of a scan's points, that say in which directions a match is one; set by hand
 KEPT = 64  # submaps; half a MB each at 3 cm and 180 beams
 
@@ -75,8 +77,11 @@ class Closures:
         self._coarse = coarse(config.tracking.relocalise)
         self.chained: list[Float] = []
         self.spent = 0
+        self._whole = config.matching.whole
+        self._prices = config.matching.budget
+        self._room_m = 2.0 * config.loops.widest_m + config.loops.near_m
         self._submaps: dict[int, CellMap] = {}  # those used last, the latest at the end
-        self._fields: dict[int, NDArray[np.uint8]] = {}  # of those that were searched
+        self._coarse_map: tuple[int, CoarseMap] | None = None  # of the one searched last
         self._drawn: set[int] = set()  # middles of all submaps so far
 
     def step(self, j: int) -> Edge:
@@ -87,7 +92,7 @@ class Closures:
         start = self._matcher.approach(cell_map, key.observations, step, covariance)
         precision = inverted(covariance)
         match = self._matcher.climb(cell_map, key.observations, start, step, precision)
-        self.spent += MATCHED
+        self._spend_match(j)
         if match.matched >= self._numbers.good_step:
             step = match.T_map_robot
             information = self._information(cell_map, key.observations, match)
@@ -96,18 +101,22 @@ class Closures:
         self.chained.append(se2.compose(self.chained[-1], step))
         return Edge(a=j - 1, b=j, T_a_b=step, information=inverted(covariance))
 
-    def tie(self, middle: int, j: int, predicted: Float) -> Edge | None:
+    def tie(self, middle: int, j: int, predicted: Float) -> Generator[None, None, Edge | None]:
         """Key frame ``j`` matched to the map about ``middle``, near where it is predicted.
 
         Or where it lay online, if ``alias`` times as much is explained there: along a corridor,
-        and among what moves, little maps say less than the whole one did.
+        and among what moves, little maps say less than the whole one did. It pauses before each
+        match.
         """
         online = self._online(middle, j)
+        self._submap(middle)
+        yield
         found = self._matched(middle, j, online)
         off = np.abs(predicted - online)
         off[2] = abs(se2.wrap(float(off[2])))
         numbers = self._numbers
         if max(off[0], off[1]) > numbers.alike_m or off[2] > numbers.alike_rad:
+            yield
             other = self._matched(middle, j, predicted)
             if found[0] < numbers.alias * other[0]:
                 found = other
@@ -122,7 +131,8 @@ class Closures:
         cell_map, seen = self._submap(middle), self._keys[j].observations
         start = self._matcher.approach(cell_map, seen, predicted, self._coarse)
         match = self._matcher.climb(cell_map, seen, start, predicted, inverted(self._coarse))
-        self.spent += MATCHED + DRAWN
+        self._spend_match(j)
+        self.spent += DRAWN
         return support(cell_map, seen, match), match
 
     def search(
@@ -131,16 +141,17 @@ class Closures:
         """The same, searched for up to ``gate`` m around; None where two places look alike.
 
         Where it lay online, if that explains ``alias`` times as much as the best of them. It
-        pauses before each match.
+        pauses between parts of the search, and before each match.
         """
-        cell_map, short_term = self._submap(middle), self._matcher.reward.short_term
-        if middle not in self._fields:
-            self._fields[middle] = coarse_field(cell_map, short_term)
-        self.spent += SEARCHED
-        points, most = self._keys[j].observations.points_robot, self._numbers.most
-        about = (predicted, gate, self._numbers.gate_rad)
+        search = self._begun_search(middle, j, (predicted, gate, self._numbers.gate_rad))
+        places: list[Float] = []
+        while not search.done:
+            yield
+            budget = Budget(self._prices, PIECE)
+            places += search.advance(budget)
+            self.spent += math.ceil(budget.spent_ns / UNIT_NS)
         found: list[tuple[float, Match]] = []
-        for place in places(cell_map, short_term, points, most, about, self._fields[middle]):
+        for place in places:
             yield
             found.append(self._matched(middle, j, place))
         if not found:
@@ -153,6 +164,19 @@ class Closures:
             return self._edge(middle, j, known[1], known[0])
         alike = any(other > self._numbers.alias * best for other, _ in others)
         return None if alike else self._edge(middle, j, match, best)
+
+    def _begun_search(self, middle: int, j: int, about: tuple[Float, float, float]) -> WholeSearch:
+        """A search of the map about ``middle``, which is laid out once for those that follow."""
+        cell_map = self._submap(middle)
+        if self._coarse_map is None or self._coarse_map[0] != middle:
+            short_term = self._matcher.reward.short_term
+            self._coarse_map = middle, CoarseMap(cell_map, short_term, self._room_m)
+        points, most = self._keys[j].observations.points_robot, self._numbers.most
+        return WholeSearch(self._coarse_map[1], points, most, self._whole, about)
+
+    def _spend_match(self, j: int) -> None:
+        points = len(self._keys[j].observations.points_robot)
+        self.spent += MATCHED + points // MATCHED_POINTS
 
     def _edge(self, middle: int, j: int, match: Match, backing: float) -> Edge | None:
         if backing < self._numbers.good_support or match.matched < self._numbers.good_match:
@@ -204,14 +228,13 @@ class Closures:
         if len(self._submaps) > KEPT:
             oldest = next(iter(self._submaps))
             del self._submaps[oldest]
-            self._fields.pop(oldest, None)
         return cell_map
 
     def restart(self, poses: list[Float]) -> None:
         """Other key frames, (3,) each."""
         self.chained = list(poses)
         self._submaps.clear()
-        self._fields.clear()
+        self._coarse_map = None
         self._drawn.clear()
 
     def _map_of(self, members: Iterable[int], origin: int) -> CellMap:

@@ -75,12 +75,12 @@ class Loops(KeyFrames):
         self._most = MOST_KEYS  # key frames in the graph, before some are merged
         self._relaxation: Relaxation | None = None
         self._relaxed: list[tuple[int, int]] = []  # loops in it
-        self._fresh = 0  # loops since the last one
-        self._surprised = False
+        self._fresh, self._surprised = 0, False  # loops since the last one, any that is far off
         self._redrawing: Redrawing | None = None
         self._new_graph = False
         self._weighed = False  # the loops were, and nobody asked what follows
         self._moved = False  # the map was corrected
+        self._owed = 0  # units spent before the next work
 
     def hold(self) -> None:
         """The map is not moved from now on."""
@@ -92,11 +92,12 @@ class Loops(KeyFrames):
         return [*self._edges.values()]
 
     def work(self) -> None:
-        """Up to ``LoopsConfig.work`` units, fewer where frames come often; tasks are ended."""
+        """Up to ``LoopsConfig.work`` units and a piece, fewer where frames come often."""
         if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
         share = self.keys[-1].start_s / self.keys[-1].frame / RARE_S
-        spent, most = 0, self._numbers.work * min(max(share, 1.0 / 3.0), 1.0)
+        spent, most = self._owed, self._numbers.work * min(max(share, 1.0 / 3.0), 1.0)
+        self._owed = 0
         while spent < most:
             cost = self._task()
             if cost == 0:
@@ -125,7 +126,7 @@ class Loops(KeyFrames):
         """
         if not self._weighed or self.keys[-1].frame != frame:
             return None
-        self._weighed = False
+        self._weighed, self._owed = False, self._cost(48)
         held = {
             pair: edge
             for pair, edge in self._edges.items()
@@ -186,7 +187,7 @@ class Loops(KeyFrames):
         if solve or self._too_many():
             self._relaxed = list(self._edges)
             self._relaxation = Relaxation(np.array(self.poses), self._chain + self.edges)
-            return 1
+            return self._cost(96)
         if self._ties:
             return self._go_on(Pausing(partial(self._tie, self._ties.popleft())))
         if len(self.poses) < len(self.keys):
@@ -194,13 +195,17 @@ class Loops(KeyFrames):
             return 1 + self.closures.spent
         if self._new_graph:
             self._follow()
-            return 1
+            return self._cost(256)
         return self._look_again()
 
     def _go_on(self, task: Pausing) -> int:
         """A task up to where it pauses or ends; the cost."""
         self._begun = task if task.go_on() else None
         return 1 + self.closures.spent
+
+    def _cost(self, edges: int) -> int:
+        """Units of work with all edges of the graph: one for so many of them."""
+        return 1 + (len(self._chain) + len(self._edges)) // edges
 
     def _append(self, j: int) -> None:
         """Chain key frame ``j`` to those before."""
@@ -268,7 +273,7 @@ class Loops(KeyFrames):
     def _relax(self, relaxation: Relaxation) -> int:
         if not relaxation.done:
             relaxation.round()
-            return 1 + len(self.poses) // 64
+            return self._cost(128)
         weights = relaxation.weights[len(self._chain) :].tolist()
         self.weights = dict(zip(self._relaxed, weights, strict=True))
         self.poses = list(relaxation.poses)
@@ -359,9 +364,8 @@ class Loops(KeyFrames):
         """Tie a key frame to all passages along there."""
         first, at, found = self._tied[j] is None, self.poses[j], []
         for middle in self._passages.all_near(j, self.poses):
-            predicted = se2.between(self.poses[middle], self.poses[j])
-            edge = self.closures.tie(middle, j, predicted)
-            if edge is not None:
+            predicted = se2.between(self.poses[middle], at)
+            if edge := (yield from self.closures.tie(middle, j, predicted)):
                 found.append((edge, predicted))
             yield
         self._tied[j] = at
@@ -372,14 +376,10 @@ class Loops(KeyFrames):
             if first and j % self._numbers.every == 0:
                 self._later.append((j + 2 * self._numbers.submap, edge.a))
             self._tied_to.add(j)
-        self._drop_rough(j)
-
-    def _drop_rough(self, j: int) -> None:
-        """Ties about ``j`` take the place of what was found there by a wide search."""
+        # ties take the place of what was found there by a wide search
         near = range(j - self._numbers.every, j + self._numbers.every + 1)
-        if self._tied_to.intersection(near):
-            for k in near:
-                self._edges.pop(self._rough.pop(k, (-1, -1)), None)
+        for k in near if self._tied_to.intersection(near) else ():
+            self._edges.pop(self._rough.pop(k, (-1, -1)), None)
 
     def _look_again(self) -> int:
         """Tie a key frame anew that the graph has moved since; the cost, 0 if there is none."""

@@ -14,7 +14,6 @@ from slam.frontend.observations import from_scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.map.network import Network
 from slam.tracker.cells import FREE_COUNT, TOUCHED_COUNT, living
-from slam.tracker.matching.branch_and_bound import Search
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
@@ -116,24 +115,3 @@ def test_every_slot_is_either_free_or_lives_once() -> None:
         together = np.sort(np.concatenate([slots, free]))
         np.testing.assert_array_equal(together, np.arange(len(network.cells.free)))
         assert (network.cells.x[slots] != 0.0).any(axis=(1, 2)).all()
-
-
-def test_the_whole_map_is_searched_alike_on_any_number_of_threads(
-    saved: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    from slam.tracker.matching import branch_and_bound, global_search
-
-    slam = ShuntingSlam.load(saved)
-    assert STREAM[50].scan is not None
-    points = from_scan(STREAM[50].scan, np.zeros(3), CONFIG).points_robot
-    monkeypatch.setattr(branch_and_bound, "WORTH_THREADS", 0)
-    found = []
-    for threads in (1, 2, 4):
-        monkeypatch.setattr(global_search, "Search", lambda of, n=threads: Search(of, n))
-        found.append(global_search.places(slam.network, 0.3, points, 3))
-    for other in found[1:]:
-        np.testing.assert_array_equal(np.array(other), np.array(found[0]))
-    assert STREAM[50].truth is not None
-    assert STREAM[0].truth is not None
-    truth = se2.between(STREAM[0].truth, STREAM[50].truth)
-    assert min(np.abs(place[:2] - truth[:2]).max() for place in found[0]) < 0.15
