@@ -3,14 +3,12 @@
 
 from __future__ import annotations
 
-import math
 from dataclasses import dataclass
 
 from slam.settings import Settings, number
 
 FITTED = "scripts.integrity.fit (docs/belief.md)"
 LENIENT = 10.0  # times frozen_above, where more is asked or no more can be told; set by hand
-LEAST_M = 0.01  # m of way that a scan counts at least: who stands can be pushed, too
 READ_OFF = "quantiles at right poses and after kidnaps, scripts.integrity.fit"
 
 
@@ -79,11 +77,6 @@ class BeliefConfig(Settings):
         high=0.05,
     )  # fmt: skip
     hopeless: float = number(20.0, "nats", "below the best: a place is followed no more")
-
-    def slipped(self, way_m: float, off_m: float = 0.0, off_rad: float = 0.0) -> float:
-        """Log prior of a slip by so much on that way."""
-        rate = math.log(self.slips_per_m * max(way_m, LEAST_M))
-        return rate - 0.5 * ((off_m / self.slip_m) ** 2 + (off_rad / self.slip_rad) ** 2)
 
 
 @dataclass(frozen=True, kw_only=True)

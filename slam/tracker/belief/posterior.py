@@ -14,6 +14,7 @@ from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.belief.config import BeliefConfig
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.cells import Look
+from slam.tracker.slips import slip_nats
 
 S_PER_H = 3600.0
 LEAST_S = 1e-3
@@ -73,7 +74,7 @@ class Odds:
         (a, b, c), (_, d, e), (_, _, f) = inverted(prediction.prior + self._pulled).tolist()
         squares = x * (a * x + 2.0 * (b * y + c * turn)) + y * (d * y + 2.0 * e * turn)
         way_m = math.hypot(*prediction.increment[:2].tolist())
-        slip = -self.config.slipped(way_m, math.hypot(x, y), turn)
+        slip = -slip_nats(self.config, way_m, math.hypot(x, y), turn)
         return min(0.5 * float(squares + f * turn * turn), slip)
 
     def carried(self, elapsed_s: float) -> float:

@@ -27,6 +27,7 @@ from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.config import UsualConfig
 from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import SCRATCH, Climb, Reward, Seen, refine
+from slam.tracker.slips import slip_nats
 
 
 class Widths(NamedTuple):
@@ -235,11 +236,11 @@ class Matcher:
             return match
         near, widest = SearchWindow.about(prior, local), SearchWindow.widest(local)
         slip = inverted(prior + np.diag([belief.slip_m**2, belief.slip_m**2, belief.slip_rad**2]))
-        slipped = belief.slipped(math.hypot(*prediction.increment[:2].tolist()))
+        slipped = slip_nats(belief, math.hypot(*prediction.increment[:2].tolist()))
         around = self._around.of(cell_map)
         poor = local.widest_share * good
         for window, about, nats, least, enough in (
-            (near, precision, 0.0, 0.0, math.inf),
+            (near, precision, 0.0, 0.0, math.inf if vague else 0.0),
             (near, slip, slipped, poor, good),
             (widest, precision, 0.0, 0.0, poor),
         ):
