@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """How often a robot slips or is pushed, unknown to odometry, and by how much.
 
-Scan matching asks it when a scan matches worse than usual, the belief when it weighs a place nearby
-against where motion led: both by the same numbers.
+The belief asks it for a place nearby against where motion led, and for a correction of odometry
+that no noise explains.
 """
 
 from __future__ import annotations

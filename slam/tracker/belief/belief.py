@@ -21,7 +21,7 @@ from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.episode import Episode, second_moment
-from slam.tracker.belief.evidence import vanished
+from slam.tracker.belief.evidence import Evidence, vanished
 from slam.tracker.belief.places import Place, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State, Status
@@ -114,6 +114,9 @@ class Belief:
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
+        if self._odds.asked and self._is_dragged(cell_map, observations, match):
+            pose = self._agreement.undragged(match.T_map_robot, observations.mean_vote)
+            match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
         gone, now = 0.0, (self._latest, match.T_map_robot)
@@ -127,6 +130,16 @@ class Belief:
         episode.places.remember(self._latest)
         episode.write(observations, match.T_map_robot, prediction.elapsed)
         return self._decided(episode, cell_map, observations, match, prediction)
+
+    def _is_dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> bool:
+        """Whether movers rather carried the match than odometry errs: by it, and what is known."""
+        dragged = self._agreement.dragged(observations.mean_vote)
+        if dragged <= 0.5:
+            return False
+        poses = match.T_map_robot, self._agreement.put_back(match.T_map_robot)
+        looks = [Evidence().add(cell_map, observations, pose) for pose in poses]
+        here, back = probabilities([self._odds.evidence(look) for look in looks])
+        return dragged * back > (1.0 - dragged) * here
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
         """A scan without a return says nothing: odometry alone."""

@@ -27,7 +27,6 @@ from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.config import UsualConfig
 from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import SCRATCH, Climb, Reward, Seen, refine
-from slam.tracker.slips import slip_nats
 
 
 class Widths(NamedTuple):
@@ -219,36 +218,24 @@ class Matcher:
         self._around = Around(self.reward.short_term)
 
     def match(self, cell_map: CellMap, observations: Observations, prediction: Prediction) -> Match:
-        """Climb from the prediction; search around it when that is vague or finds too little.
-
-        Where too little is found, wheels may have slipped: it is searched as after a slip, and what
-        that finds has to be better by the price of a slip.
-        """
+        """Climb from the prediction; search around it when that is vague or finds too little."""
         predicted, prior = prediction.T_map_robot, prediction.prior
         precision = inverted(prior)
         start = self.approach(cell_map, observations, predicted, prior)
         match = self.climb(cell_map, observations, start, predicted, precision)
-        local, belief = self.numbers.local, self.config.belief
+        local = self.numbers.local
         good = local.good_share * self.usual.match
         vague_m = local.vague_cells * self.config.cell_m  # as far as the climb reaches
         vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > vague_m
         if not vague and match.matched >= good:
             return match
-        near, widest = SearchWindow.about(prior, local), SearchWindow.widest(local)
-        slip = inverted(prior + np.diag([belief.slip_m**2, belief.slip_m**2, belief.slip_rad**2]))
-        slipped = slip_nats(belief, math.hypot(*prediction.increment[:2].tolist()))
         around = self._around.of(cell_map)
-        poor = local.widest_share * good
-        for window, about, nats, least, enough in (
-            (near, precision, 0.0, 0.0, math.inf if vague else 0.0),
-            (near, slip, slipped, poor, good),
-            (widest, precision, 0.0, 0.0, poor),
-        ):
-            if match.matched >= enough:
-                continue
-            found = self.search(cell_map, observations, predicted, about, window, around)
-            if found.score + nats > match.score and found.matched >= least:
-                match = replace(found, score=found.score + nats)
+        for window in (SearchWindow.about(prior, local), SearchWindow.widest(local)):
+            found = self.search(cell_map, observations, predicted, precision, window, around)
+            if found.score > match.score:
+                match = found
+            if match.matched >= local.widest_share * good:
+                break
         return match
 
     def climb(

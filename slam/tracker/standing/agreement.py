@@ -82,14 +82,19 @@ class Agreement:
         nats = min(1.5 * (self.ratio - self._config.disagreed), 50.0)  # of 3 numbers: 3 / 2
         return (1.0 - vote) / (1.0 + math.exp(-nats))
 
+    def put_back(self, T_map_robot: Float) -> Float:
+        """(3,) the pose without what matches corrected: where odometry leads."""
+        pose: Float = T_map_robot - np.array(self._sums[self._worst])
+        pose[2] = se2.wrap(float(pose[2]))
+        return pose
+
     def undragged(self, T_map_robot: Float, vote: float) -> Float:
-        """(3,) the pose without what matches corrected, where odometry leads; the sums begin anew.
+        """(3,) the pose put back, from which the sums begin anew.
 
         With the rest of the probability the matches were right: the pose is off by S now, and
         ``left_behind`` says so.
         """
-        pose: Float = T_map_robot - np.array(self._sums[self._worst])
-        pose[2] = se2.wrap(float(pose[2]))
+        pose = self.put_back(T_map_robot)
         dragged = self.dragged(vote)
         put_back = self.covariance(dragged * (1.0 - dragged))
         self.forget()

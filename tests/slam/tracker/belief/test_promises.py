@@ -5,13 +5,11 @@ from __future__ import annotations
 
 import math
 from collections import Counter
-from dataclasses import replace
 from typing import Any
 
 import numpy as np
 import pytest
 
-from slam import se2
 from slam.frontend.observations import observe
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.episode import Episode
@@ -274,20 +272,37 @@ def test_the_local_copy_grows_no_further_than_by_its_bound(monkeypatch: pytest.M
     assert used(system.cell_map.cells) == known
 
 
-def test_wheels_that_slip_while_boards_hide_most_do_not_turn_the_robot() -> None:
-    """Odometry turns by 3 degrees a scan, 20 times what it claims, and the robot stands."""
+def test_a_false_alarm_that_movers_carried_the_matches_off_changes_nothing(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """It is taken back to where odometry leads, and the map says in the same scan where it is."""
     system, last = mapped(ROOMS)
-    pose = x, y, _ = at(system)
-    boards = [[x - 0.9, y - 0.9, x - 0.9, y + 0.9], [x - 0.9, y + 0.9, x + 0.54, y + 0.9]]
-    room = World2D(np.concatenate([ROOMS.segments, boards]))
-    stream = []
-    for k, frame in enumerate(going_on(still(room, pose, 3.0), last), 1):
-        turned = se2.compose(frame.odometry.T_odom_robot, np.array([0.0, 0.0, math.radians(3 * k)]))
-        claimed = np.diag([1e-6, 1e-6, math.radians(0.15) ** 2])
-        odometry = replace(
-            frame.odometry, T_odom_robot=turned, increment_covariance=claimed, twist=None
+    pose = at(system)
+    stream = going_on(still(ROOMS, pose, 2.0), last)
+    with monkeypatch.context() as patched:
+        patched.setattr(system._standing.agreement, "dragged", lambda vote: 0.9)
+        patched.setattr(
+            system._standing.agreement, "undragged", lambda T, _: T + np.array([0.15, 0.0, 0.0])
         )
-        stream.append(replace(frame, odometry=odometry))
-    said = told(system, stream)
-    assert max(abs(float(off(one, pose)[2])) for one in said) < math.radians(5.0)
-    assert off_m(said[-1], pose) < 0.05
+        said = told(system, stream[:1])
+    said += told(system, stream[1:])
+    assert max(off_m(one, pose) for one in said) < 0.02
+    assert said[-1].converged
+
+
+@pytest.mark.parametrize(("hidden", "stays"), [(False, True), (True, False)])
+def test_a_match_is_put_back_to_odometry_only_where_what_is_long_known_allows_it(
+    monkeypatch: pytest.MonkeyPatch, hidden: bool, stays: bool
+) -> None:
+    """Odometry is what is off while walls are in view; among movers that hide them it is not."""
+    system, last = mapped(ROOMS)
+    pose = at(system)
+    box = rectangle(pose[0] - 0.9, pose[1] - 0.9, pose[0] + 0.9, pose[1] + 0.9)
+    room = World2D(np.concatenate([box, arena()])) if hidden else ROOMS
+    monkeypatch.setattr(system._standing.agreement, "dragged", lambda vote: 0.9)
+    monkeypatch.setattr(
+        system._standing.agreement, "put_back", lambda T: T + np.array([0.3, 0.0, 0.0])
+    )
+    said = told(system, going_on(still(room, pose, 0.2), last)[:1])[0]
+    moved_m = float(np.hypot(*(system._T_map_robot - pose)[:2]))
+    assert (moved_m < 0.02) == stays, said.diagnostics
