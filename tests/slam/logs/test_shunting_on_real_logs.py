@@ -25,4 +25,4 @@ def test_closed_loops_bring_the_museum_within_its_reference(data_folder):
     )
     final = track.final()
     assert final is not None
-    assert metrics.ate(final, truth, align="se2").value <= 0.16
+    assert metrics.ate(final, truth, align="se2").value <= 0.15
