@@ -6,7 +6,7 @@ from __future__ import annotations
 import signal
 from types import FrameType
 
-LLVM = ("llvmlite.binding", "numba.core.codegen", "slam._numba")  # modules
+LLVM = ("llvmlite.binding", "numba.core.codegen", "numba.core.serialize", "slam._numba")  # modules
 _RETRY_S = 0.05  # s, until a signal that came while LLVM was at work is raised
 _asked = False
 

@@ -265,9 +265,8 @@ def _plain(value: Any) -> Any:
 
 def read_recipe_words(path: Path) -> dict[str, Any]:
     """The object in a ``recipe.json`` of whatever command; ``LogFormatError`` for anything else."""
-    words = json_of(path, MAX_RECIPE_BYTES, "recipe", strict=False)
     check_vouched(path)
-    return words
+    return json_of(path, MAX_RECIPE_BYTES, "recipe", strict=False)
 
 
 def slams_of(path: Path, settings: Mapping[str, Any]) -> list[str]:

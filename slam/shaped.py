@@ -28,6 +28,7 @@ Number = Annotated[float, Meta(ge=-MOST, le=MOST)]  # any finite one
 Positive = Annotated[float, Meta(gt=0.0, le=MOST)]
 NotNegative = Annotated[float, Meta(ge=0.0, le=MOST)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+PRINTABLE = r"\A[^\x00-\x1f\x7f-\x9f\u2028\u2029]*\Z"  # pattern of words without control characters
 _MANY = (inspect.ListType, inspect.VarTupleType)
 _OBJECT = (inspect.StructType, inspect.DataclassType)
 
@@ -42,7 +43,7 @@ def shaped(owner: str, value: Any, kind: Any) -> Any:
     owner  what the value is, for the error
     Raises ``InvalidValueError`` that names the field, what was expected, and the value.
     """
-    value = value.item() if isinstance(value, np.generic) else value
+    value = _plain(value)
     try:
         return msgspec.convert(value, kind)
     except msgspec.ValidationError as error:
@@ -75,8 +76,14 @@ def check(config: Any) -> None:
     for field, kind in kinds.__annotations__.items():
         if is_dataclass(kind):  # a table of its fields will not do
             instance(f"{name}.{field}", values[field], cast(type, kind))
-    plain = {k: v.item() if isinstance(v, np.generic) else v for k, v in values.items()}
-    shaped(name, plain, kinds)
+    shaped(name, {k: _plain(v) for k, v in values.items()}, kinds)
+
+
+def _plain(value: Any) -> Any:
+    """Without NumPy's scalars, in a tuple too."""
+    if isinstance(value, tuple):
+        return tuple(map(_plain, value))
+    return value.item() if isinstance(value, np.generic) else value
 
 
 @cache
@@ -131,7 +138,7 @@ def wanted(kind: inspect.Type) -> str:
         words = list(map(wanted, kind.item_types))
         each = f", each {words[0]}" if len(set(words)) == 1 else f": {', '.join(words)}"
         return f"{len(words)} values{each}"
-    if isinstance(kind, inspect.StrType) and kind.pattern:
+    if isinstance(kind, inspect.StrType) and kind.pattern not in (None, PRINTABLE):
         return f"a word that matches {kind.pattern}"
     if isinstance(kind, (*_MANY, inspect.StrType)):
         what = "letters" if isinstance(kind, inspect.StrType) else "values"

@@ -59,7 +59,7 @@ class Click(_Checked):
     def __post_init__(self) -> None:
         super().__post_init__()
         if not any(self.direction):
-            raise InvalidValueError("click: a ray must have a direction, got zeros")
+            raise InvalidValueError("Click.direction must not be three zeros")
 
 
 @dataclass(frozen=True, kw_only=True)

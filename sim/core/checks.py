@@ -9,7 +9,7 @@ import numpy as np
 from msgspec import Meta
 
 from slam.errors import InvalidValueError
-from slam.shaped import Number, instance, one_of, shaped, within
+from slam.shaped import PRINTABLE, Number, instance, one_of, shaped, within
 
 __all__ = [
     "FAR_M", "MOST_LETTERS", "instance", "number", "numbers", "one_of", "switch", "whole",
@@ -17,7 +17,7 @@ __all__ = [
 ]  # fmt: skip
 MOST_LETTERS = 100  # of a name
 FAR_M = 1e6  # no place of a scene is farther away
-Word = Annotated[str, Meta(max_length=MOST_LETTERS)]
+Word = Annotated[str, Meta(max_length=MOST_LETTERS, pattern=PRINTABLE)]
 Metres = Annotated[float, Meta(ge=-FAR_M, le=FAR_M)]
 Point = tuple[Metres, Metres, Metres]
 

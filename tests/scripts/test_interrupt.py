@@ -54,6 +54,38 @@ def test_a_signal_waits_for_llvm():
     assert said_after(signal.SIGTERM, words) == "compiled\nunwound"
 
 
+BOXING = """
+import signal, sys
+from collections import namedtuple
+import numba
+from scripts import interrupt
+
+kernel = numba.njit(lambda x: PAIR(x, x))
+PAIR = namedtuple("PAIR", "a b")
+kernel(1.0)
+interrupt.install()
+
+def once(frame, event, argument):
+    if frame.f_code.co_name == "_numba_unpickle":
+        sys.setprofile(None)
+        signal.raise_signal(signal.SIGTERM)
+
+try:
+    sys.setprofile(once)
+    while True:
+        kernel(1.0)
+except interrupt.InterruptedBySignal:
+    print("unwound")
+"""
+
+
+def test_a_signal_waits_until_python_has_a_kernel_s_answer():
+    """Numba asks Python for the class of a named tuple, and calls whatever it got."""
+    words = [sys.executable, "-c", BOXING]
+    done = subprocess.run(words, cwd=REPO, capture_output=True, text=True, timeout=60)
+    assert done.stdout == "unwound\n", done.stderr
+
+
 def test_the_end_of_the_terminal_is_ignored_under_nohup():
     words = ["nohup", sys.executable, "-c", CODE.format(seconds=0.5)]
     assert said_after(signal.SIGHUP, words) == "undisturbed"

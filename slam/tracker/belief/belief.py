@@ -33,6 +33,7 @@ from slam.tracker.matching.matcher import Match, Matcher, Usual, near, unmatched
 from slam.tracker.standing.agreement import Agreement
 
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
+LEFT_S = 3.0  # for so long nothing of the map is in view: no crowd in passing; set by hand
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -340,10 +341,10 @@ class Belief:
             same = _same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
             # the robot has left the map: no scan will tell more
-            left = waited_enough and place.evidence.latest_m < self._config.confirmed_m
+            left = waited_enough and place.unseen_s >= LEFT_S
             taken = (goes_on and p >= sure) or (left and p >= 1.0 - LENIENT * (1.0 - sure))
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
-                return self._found(place, episode, cell_map, observations, prediction)
+                return self._found(place, episode, cell_map, prediction, writes=left)
         if 1.0 - self._p_off >= sure:
             self._episode = None
             return self._settled(episode.local, match, prediction)
@@ -360,8 +361,9 @@ class Belief:
         place: Place,
         episode: Episode,
         cell_map: CellMap,
-        observations: Observations,
         prediction: Prediction,
+        *,
+        writes: bool,
     ) -> Judged:
         self._episode, self.p_lost, self.status = None, 0.0, Status.TRACKING
         self._agreement.forget()
@@ -375,6 +377,7 @@ class Belief:
             )  # fmt: skip
         return Judged(
             match=place.match, prediction=prediction, state=State.RELOCATED, cell_map=cell_map,
+            writes=writes,  # off the map nothing else is there for the next scan to go on from
         )  # fmt: skip
 
     def spread_about(self, T_map_robot: Float, anywhere: Callable[[Float], Float]) -> Float:

@@ -25,7 +25,6 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import used
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
-from slam.tracker.slips import slip_nats
 
 MOST_NEW = 2000  # blocks, set by hand: all of the station has 8000, at cells of 3 cm
 
@@ -96,7 +95,7 @@ class Episode:
     def prior(self, place: Match, here: Float) -> float:
         """Nats of a slip from ``here`` to that place."""
         x, y, turn = (place.T_map_robot - here).tolist()
-        return slip_nats(self._odds.config, self.way_m, math.hypot(x, y), se2.wrap(turn))
+        return self._odds.slipped(self.way_m, math.hypot(x, y), se2.wrap(turn))
 
     def weight(self, place: Place) -> float:
         """Nats of having been carried to a place, or of having slipped there."""

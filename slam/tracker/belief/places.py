@@ -47,6 +47,7 @@ class Place:
     prior     nats of having slipped there; none: it cannot have
     gain_m    mean of the trace that a scan confirms more from there than from where motion led
     scans     that were matched there
+    unseen_s  s since a scan from there last confirmed more than may be by chance
     waited    scans since it was matched, ``drift`` (3, 3) what odometry may be off since
     """
 
@@ -55,6 +56,7 @@ class Place:
     prior: float = -MOST_NATS
     gain_m: float = 0.0
     scans: int = 1
+    unseen_s: float = 0.0
     waited: int = 0
     drift: Float = field(default_factory=lambda: np.zeros((3, 3)))
 
@@ -196,9 +198,10 @@ class Places:
         match = self._climb(observations, moved.match.T_map_robot, moved.drift)
         old.evidence.add(self._cell_map, observations, match.T_map_robot)
         gain_m, scans = old.evidence.latest_m - here.latest_m, old.scans + 1
+        seen = old.evidence.latest_m >= self._matcher.config.belief.confirmed_m
         return replace(
             moved, match=match, gain_m=old.gain_m + (gain_m - old.gain_m) / scans, scans=scans,
-            waited=0, drift=np.zeros((3, 3)),
+            unseen_s=0.0 if seen else moved.unseen_s, waited=0, drift=np.zeros((3, 3)),
         )  # fmt: skip
 
     def _waiting(self, old: Place, prediction: Prediction) -> Place:
@@ -210,7 +213,8 @@ class Places:
         else:
             drift = turned(prediction.step, float(before[2]) - tracked)
         match = replace(old.match, T_map_robot=se2.compose(before, increment))
-        return replace(old, match=match, waited=old.waited + 1, drift=drift)
+        unseen_s, waited = old.unseen_s + prediction.elapsed, old.waited + 1
+        return replace(old, match=match, unseen_s=unseen_s, waited=waited, drift=drift)
 
     def _climb(self, observations: Observations, T_map_robot: Float, covariance: Float) -> Match:
         start = self._matcher.approach(self._cell_map, observations, T_map_robot, covariance)

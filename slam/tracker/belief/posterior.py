@@ -14,9 +14,9 @@ from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.belief.config import BeliefConfig
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.cells import Look
-from slam.tracker.slips import slip_nats
 
 S_PER_H = 3600.0
+LEAST_M = 0.01  # m of way that a scan counts at least: who stands can be pushed, too
 LEAST_S = 1e-3
 MOST_NATS = 700.0  # exp of less is no zero
 
@@ -74,7 +74,7 @@ class Odds:
         (a, b, c), (_, d, e), (_, _, f) = inverted(prediction.prior + self._pulled).tolist()
         squares = x * (a * x + 2.0 * (b * y + c * turn)) + y * (d * y + 2.0 * e * turn)
         way_m = math.hypot(*prediction.increment[:2].tolist())
-        slip = -slip_nats(self.config, way_m, math.hypot(x, y), turn)
+        slip = -self.slipped(way_m, math.hypot(x, y), turn)
         return min(0.5 * float(squares + f * turn * turn), slip)
 
     def carried(self, elapsed_s: float) -> float:
@@ -82,6 +82,12 @@ class Odds:
         if self._carried_per_h == 0.0:
             return -MOST_NATS
         return math.log(self._carried_per_h * max(elapsed_s, LEAST_S) / S_PER_H)
+
+    def slipped(self, way_m: float, off_m: float, off_rad: float) -> float:
+        """Log prior of a slip by so much on that way."""
+        config = self.config
+        rate = math.log(config.slips_per_m * max(way_m, LEAST_M))
+        return rate - 0.5 * ((off_m / config.slip_m) ** 2 + (off_rad / config.slip_rad) ** 2)
 
 
 def sum_of(nats: Sequence[float]) -> float:

@@ -195,7 +195,7 @@ class Closures:
         short_term, numbers = self._matcher.reward.short_term, cell_map.config.uncertainty
         geometry, feigned = np.zeros((3, 3)), 0.0
         step = max(1, len(seen.points_robot) // numbers.residuals.samples)
-        for turn in range(0, step, max(1, step // SAMPLES)):
+        for turn in range(0, step, -(-step // SAMPLES)):
             one = look(cell_map, short_term, seen, match.T_map_robot, (1.0, 0.0), turn)
             geometry, feigned = geometry + one.geometry, feigned + one.feigned
         out, information = np.empty((3, 3)), match.tau * match.information

@@ -16,7 +16,10 @@ class TrackingConfig(Settings):
     """Following the robot, and finding it again."""
 
     give_up_s: float = number(
-        60.0, "s", "of being lost: a session in a known map lies apart from then on"
+        60.0,
+        "s",
+        "of doubt: from then on 90 % are enough for who has left the map, and a session "
+        "in a known map lies apart",
     )
     relocalise: RelocaliseConfig = field(default=RelocaliseConfig())
 

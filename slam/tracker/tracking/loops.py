@@ -119,8 +119,8 @@ class Loops(KeyFrames):
         return Correction(T_new_old=T_new_old, cell_map=redrawing.cell_map, poses=moved)
 
     def map_error(self, frame: int) -> Float | None:
-        """(3, 3) by which the map is off here, where ``frame`` is a key frame and loops have just
-        been weighed; else None: the error of the frame before has grown by what was driven.
+        """(3, 3) by which the map is off here, where ``frame`` is a key frame and loops were
+        weighed before it; else None: the error of the frame before has grown by what was driven.
 
         A corrected map may have moved its first key frame: by that it is off the known start, too.
         """

@@ -10,7 +10,8 @@ from typing import Any
 class Pausing:
     """A task that yields where it may pause, and notes what it found at its end only.
 
-    A generator cannot be copied: a copy, or a pickled one, begins the task anew.
+    A generator cannot be copied: a copy, or a pickled one, begins the task anew. It finds the same,
+    some scans later.
     """
 
     def __init__(self, task: Callable[[], Iterator[None]]) -> None:

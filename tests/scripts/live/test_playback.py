@@ -7,6 +7,7 @@ import math
 from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
 import pytest
 
 from scripts.live.playback import (
@@ -123,6 +124,8 @@ def test_an_inbox_that_is_full_says_so():
     [
         (Push, {"name": "x" * 101}, "Push.name must be a word of 0 to 100 letters"),
         (Push, {"name": 7}, "Push.name must be a word"),
+        (Push, {"name": "a\nb"}, "Push.name must be a word"),
+        (MoveDoor, {"opened": True, "name": "\x1b"}, "MoveDoor.name must be a word"),
         (Drive, {"v": math.inf, "omega": 0.0}, "Drive.v must be a number from"),
         (Drive, {"v": math.nan, "omega": 0.0}, "Drive.v must be a number from .* got nan"),
         (Drive, {"v": "1", "omega": 0.0}, "Drive.v must be a number from .* got '1'"),
@@ -132,7 +135,7 @@ def test_an_inbox_that_is_full_says_so():
         (Speed, {"factor": 1e9}, "Speed.factor must be a number from 0.05 to 20"),
         (Kidnap, {"pose": (0.0, math.nan, 0.0)}, r"Kidnap.pose\[1\] must be a number"),
         (Click, {"origin": (0, 0), "direction": (0, 0, 1)}, "Click.origin must be 3 values"),
-        (Click, {"origin": (0, 0, 1), "direction": (0, 0, 0)}, "must have a direction"),
+        (Click, {"origin": (0, 0, 1), "direction": (0, 0, 0)}, "must not be three zeros"),
         (Anew, {"motion": 2.0}, "Anew.motion must be a number from"),
         (Anew, {"slam": "x" * 500}, "Anew.slam must be a word"),
     ],
@@ -140,3 +143,8 @@ def test_an_inbox_that_is_full_says_so():
 def test_a_request_that_means_nothing_is_refused_at_birth(kind, words, said):
     with pytest.raises(InvalidValueError, match=said):
         kind(**words)
+
+
+def test_places_may_come_as_numpy_s_numbers():
+    assert Push(towards=tuple(np.array([1.0, 2.0]))).towards == (1.0, 2.0)
+    assert Kidnap(pose=tuple(np.array([1.0, 2.0, 0.0]))).pose == (1.0, 2.0, 0.0)

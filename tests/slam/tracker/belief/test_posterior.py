@@ -15,6 +15,7 @@ from slam.frontend.odometry_prior import Prediction
 from slam.tracker.belief.config import BeliefConfig
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.posterior import (
+    LEAST_M,
     LEAST_S,
     MOST_NATS,
     S_PER_H,
@@ -23,7 +24,6 @@ from slam.tracker.belief.posterior import (
     sum_of,
 )
 from slam.tracker.cells import Look
-from slam.tracker.slips import LEAST_M, slip_nats
 
 Array = NDArray[np.float64]
 CONFIG = BeliefConfig()
@@ -119,23 +119,19 @@ def test_a_correction_costs_its_innovation(seed: int) -> None:
 def test_a_correction_costs_no_more_than_the_slip_that_explains_it() -> None:
     prediction = predicted(np.diag([1e-6, 1e-6, 1e-6]), way_m=0.3)
     for off in (np.array([0.9, -1.2, 0.1]), np.array([0.0, 0.0, -0.9])):
-        slip = -slip_nats(ODDS.config, 0.3, math.hypot(off[0], off[1]), float(off[2]))
+        slip = -ODDS.slipped(0.3, math.hypot(off[0], off[1]), float(off[2]))
         assert ODDS.corrected(prediction, prediction.T_map_robot + off) == pytest.approx(slip)
 
 
 def test_the_prior_of_a_slip_is_a_rate_a_metre_times_a_gaussian() -> None:
-    here = slip_nats(ODDS.config, 2.0, 0.0, 0.0)
+    here = ODDS.slipped(2.0, 0.0, 0.0)
     assert here == pytest.approx(math.log(2.0 * CONFIG.slips_per_m))
     for m, rad in ((0.1, 0.0), (0.4, -0.3), (0.0, 0.7)):
         squares = (m / CONFIG.slip_m) ** 2 + (rad / CONFIG.slip_rad) ** 2
-        assert slip_nats(ODDS.config, 2.0, m, rad) - here == pytest.approx(-0.5 * squares)
-        assert slip_nats(ODDS.config, 2.0, m, -rad) == slip_nats(ODDS.config, 2.0, m, rad)
-    assert slip_nats(ODDS.config, 4.0, 0.1, 0.1) - slip_nats(
-        ODDS.config, 2.0, 0.1, 0.1
-    ) == pytest.approx(math.log(2.0))
-    assert slip_nats(ODDS.config, 0.0, 0.1, 0.0) == slip_nats(
-        ODDS.config, LEAST_M, 0.1, 0.0
-    )  # who stands is pushed
+        assert ODDS.slipped(2.0, m, rad) - here == pytest.approx(-0.5 * squares)
+        assert ODDS.slipped(2.0, m, -rad) == ODDS.slipped(2.0, m, rad)
+    assert ODDS.slipped(4.0, 0.1, 0.1) - ODDS.slipped(2.0, 0.1, 0.1) == pytest.approx(math.log(2.0))
+    assert ODDS.slipped(0.0, 0.1, 0.0) == ODDS.slipped(LEAST_M, 0.1, 0.0)  # who stands is pushed
 
 
 def test_the_prior_of_being_carried_is_a_rate_an_hour() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 
 import math
 from collections import Counter
+from dataclasses import replace
 from typing import Any
 
 import numpy as np
@@ -164,9 +165,13 @@ def test_who_leaves_the_map_in_doubt_is_believed_after_a_while(
     system = ShuntingSlam(FAST.changed(numbers))
     stream = frames(hall, TURN, rate_hz=5.0, seed=3, spec=short)
     told(system, stream)
-    drive = Drive((2.0, 0.5, 1.0), ((0.0, 0.4, 1.0), (0.0, -1.4, 1.0), (1.5, 0.0, 8.0)))
-    after = going_on(frames(hall, drive, rate_hz=5.0, seed=7, spec=short), stream[-1])
-    for frame in after:
+    drive = Drive((2.0, 0.5, 1.0), ((0.0, 0.4, 1.0), (0.0, -1.4, 1.0), (1.5, 0.0, 12.0)))
+    after = frames(hall, drive, rate_hz=5.0, seed=7, spec=short)
+    x, y, _ = np.asarray(after[25].truth)
+    closed = World2D(np.vstack([hall.segments, rectangle(x - 0.6, y - 0.6, x + 0.6, y + 0.6)]))
+    box = frames(closed, drive, rate_hz=5.0, seed=7, spec=short)[25]  # people about it, one scan
+    after[25] = replace(after[25], scan=box.scan)
+    for frame in going_on(after, stream[-1]):
         estimate = system.update(frame.without_truth())
         assert not estimate.converged or off_m(estimate, frame.truth) < 0.2
         assert frame.truth is not None
