@@ -32,6 +32,7 @@ LEAST_SCALE = 2.25  # least factor on a stated variance: else the map drifts unn
 LEAST_M, LEAST_RAD = 0.004, 0.003  # least deviation for the matcher, after FLOOR_S
 # deviations where none is stated: m/m, m/rad, rad/sqrt(m), rad/rad
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
+SLIP = 12.0  # squared innovation of x, y and heading above which wheels slip: 3.5 sigma
 LEAST_VARIANCE = 1e-12  # m^2 and rad^2, added so that none is zero: (1 um)^2, (1 urad)^2
 TWIST_S = 0.5  # s, longest odometry step that gives a twist
 
@@ -136,6 +137,14 @@ def inverted(matrix: Float) -> Float:
     return np.array([[a, b, c], [b, d, e], [c, e, f]])
 
 
+def squared(off: Float, covariance: Float) -> float:
+    """``off`` (3,) in deviations, squared: off' inv(covariance) off in a fixed order."""
+    x, y, t = off.tolist()
+    (a, b, c), (_, d, e), (_, _, f) = inverted(covariance).tolist()
+    form: float = x * (a * x + 2.0 * (b * y + c * t)) + y * (d * y + 2.0 * e * t) + f * t * t
+    return form
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Prediction:
     """Prior of one frame.
@@ -148,6 +157,7 @@ class Prediction:
     unscaled     (3, 3) as stated or assumed, in the previous robot frame; zero: nothing to learn
     floor        m^2 and rad^2 that were added
     loosened     (3, 3) that the matcher's prior of the increment has more than the covariance
+    slips        whether the covariance is mostly that of a slip that may go on
     carried      (3, 3) of the pose before, from odometry that no match has confirmed yet; zero
                  where too little is in view: things that move would lead astray
     """
@@ -160,6 +170,7 @@ class Prediction:
     unscaled: Float = field(default_factory=lambda: np.zeros((3, 3)))
     floor: tuple[float, float] = (0.0, 0.0)
     loosened: Float = field(default_factory=lambda: np.zeros((3, 3)))
+    slips: bool = False
     carried: Float = field(default_factory=lambda: np.zeros((3, 3)))
 
     @property
@@ -171,6 +182,16 @@ class Prediction:
     def prior(self) -> Float:
         """(3, 3) of the pose, as the matcher takes it."""
         return self.covariance + self.loosened + self.carried
+
+    def off(self, T_map_robot: Float) -> Float:
+        """(3,) by how far a pose corrects the predicted one."""
+        off = T_map_robot - self.T_map_robot
+        off[2] = se2.wrap(float(off[2]))
+        return off
+
+    def is_slip(self, T_map_robot: Float) -> bool:
+        """Whether odometry cannot have led to that pose."""
+        return squared(self.off(T_map_robot), self.prior) > SLIP
 
 
 def assumed_covariance(increment: Float) -> Float:

@@ -205,11 +205,13 @@ class Tracker(abc.ABC):
         agreement, dragged = self._standing.agreement, 0.0
         if match.slipped:  # found by a search, among what does not fit there
             found = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
-            self._pose_covariance.dragged(found)
+            self._pose_covariance.displaced(found)
         else:
             dragged = agreement.dragged(observations.mean_vote)
             left_behind = agreement.left_behind(dragged)
             self._pose_covariance.dragged(left_behind, agreement.covariance(dragged))
+        if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
+            self._odometry_noise.note_slip(prediction, match)
         if judged.state is State.TRACKING and not match.slipped:
             sigma_m, along_rad = observations.sensor_sigma_m, self._pose_covariance.along_rad
             self._odometry_noise.learn(prediction, match, sigma_m, along_rad)
@@ -224,8 +226,7 @@ class Tracker(abc.ABC):
         covariance = self._pose_covariance.newest_drift
         found = state is State.RELOCATED
         if found:  # carried away, or odometry was right: loops decide
-            off = match.T_map_robot - prediction.T_map_robot
-            off[2] = se2.wrap(float(off[2]))
+            off = prediction.off(match.T_map_robot)
             covariance = prediction.covariance + coarse(self.config.tracking.relocalise)
             covariance = covariance + np.diag(off * off)
         elif state is not State.TRACKING and judged.followed:

@@ -8,9 +8,8 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from slam import se2
 from slam.frames import Float
-from slam.frontend.odometry_prior import Prediction, inverted
+from slam.frontend.odometry_prior import Prediction, squared
 from slam.tracker.belief.config import BeliefConfig
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.cells import Look
@@ -69,13 +68,11 @@ class Odds:
 
         Movers pull matches by ``pulled_m`` and ``pulled_rad``, which is neither.
         """
-        x, y, turn = (T_map_robot - prediction.T_map_robot).tolist()
-        turn = se2.wrap(turn)
-        (a, b, c), (_, d, e), (_, _, f) = inverted(prediction.prior + self._pulled).tolist()
-        squares = x * (a * x + 2.0 * (b * y + c * turn)) + y * (d * y + 2.0 * e * turn)
+        off = prediction.off(T_map_robot)
+        x, y, turn = off.tolist()
         way_m = math.hypot(*prediction.increment[:2].tolist())
         slip = -self.slipped(way_m, math.hypot(x, y), turn)
-        return min(0.5 * float(squares + f * turn * turn), slip)
+        return min(0.5 * squared(off, prediction.prior + self._pulled), slip)
 
     def carried(self, elapsed_s: float) -> float:
         """Log prior of having been carried in that time."""

@@ -22,8 +22,9 @@ class Agreement:
 
     A window of w s forgets with exp(-t / w): S is the sum of corrections c, V that of odometry's
     covariances and of v^4 c c'. With nearly all returns of weight (mean vote v about 1) a
-    correction is odometry's own error, however rare one so large is. With R, what a match itself
-    may be off, S' (V + R)^-1 S / 3 is at most about 1 where all is well.
+    correction is odometry's own error, however rare one so large is. While wheels slip, corrections
+    are no sign of movers, and are left out. With R, what a match itself may be off,
+    S' (V + R)^-1 S / 3 is at most about 1 where all is well.
 
     ratio  the larger one of the two windows
     """
@@ -46,8 +47,7 @@ class Agreement:
 
     def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
         """The robot is matched to ``T_map_robot`` by returns of that mean vote."""
-        off = (T_map_robot - prediction.T_map_robot).tolist()
-        off[2] = se2.wrap(off[2])
+        off = [0.0] * 3 if prediction.slips else prediction.off(T_map_robot).tolist()
         (xx, xy, xt), (_, yy, yt), (_, _, tt) = prediction.covariance.tolist()
         x, y, t = off
         w = vote * vote * vote * vote

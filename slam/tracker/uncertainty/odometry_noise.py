@@ -4,21 +4,26 @@
 An innovation is where a match alone puts the robot, against where odometry does. Its covariance is
 that of the increment plus that of a match. What was driven lately says by how much to multiply the
 first, apart for translation and for rotation, whether a log states it or it had to be assumed.
+
+Wheels that slip, or people who push the robot, do so for some tenths of a second. After two scans
+in a row that odometry cannot have led to, its next increments may be off by as much.
 """
 
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 from typing import Self
 
 import numpy as np
 
-from slam import se2
 from slam.frames import Float, Odometry
 from slam.frontend.odometry_prior import HeadingBias, Prediction, predict, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import innovation
+
+SLIP_S = 0.2  # s that a slip lasts in the mean; set by hand: station, 0.6 rad in 0.6 s
 
 
 def _across(covariance: Float, across: tuple[float, float]) -> float:
@@ -56,6 +61,8 @@ class OdometryNoise:
         self.bias = bias
         self._stated = False
         self._least = least_stated
+        self._slips = False  # in the latest frame
+        self._slip: Float = np.zeros((3, 3))  # of the next increment, should a slip go on
         self._squares: Float = np.zeros(2)
         self._expected: Float = np.zeros(2)
 
@@ -91,7 +98,19 @@ class OdometryNoise:
             self.scales = self._squares / self._expected
         scales = float(self.scales[0]), float(self.scales[1])
         self._stated = stated
-        return predict(T_map_before, before, now, scales, self.bias)
+        prediction = predict(T_map_before, before, now, scales, self.bias)
+        self._slip = math.exp(-max(prediction.elapsed, 0.0) / SLIP_S) * self._slip
+        covariance = prediction.covariance
+        slips = bool((np.diag(self._slip) > np.diag(covariance)).any())
+        return replace(prediction, covariance=covariance + self._slip, slips=slips)
+
+    def note_slip(self, prediction: Prediction, match: Match) -> None:
+        """Ask it of a match, to the map or to a local copy."""
+        slipped, found = self._slips, match.tau > 0.0 and prediction.elapsed <= SLIP_S
+        self._slips = found and prediction.is_slip(match.T_map_robot)
+        if slipped and self._slips:
+            off = prediction.off(match.T_map_robot)
+            self._slip = self._slip + np.multiply.outer(off, off)
 
     def learn(
         self,
@@ -104,8 +123,7 @@ class OdometryNoise:
 
         ``along_rad``: direction in the map about which the match says nothing; None: there is none.
         """
-        off = match.T_map_robot - prediction.T_map_robot
-        off[2] = se2.wrap(float(off[2]))
+        off = prediction.off(match.T_map_robot)
         data = match.tau * match.information
         if (
             self.bias is not None and self._stated
