@@ -4,8 +4,6 @@
 ``arena``, ``office`` and the others are recipes of their own, as they have options of their own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Steps the recipes share: seeded streams, counts, chairs, people, doors, the finished Scene."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache

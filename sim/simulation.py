@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """World + scanner + encoders = frames, the same for every listener."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace

@@ -8,8 +8,6 @@ does not tell where the robot is. It is a bound, no contestant: nobody else is s
 moves now (``slam.variants.oracle_of``).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

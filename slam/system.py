@@ -19,8 +19,6 @@ Who wants one of these asks whether it is there (``slam.replay.Track``), never f
 ``create("oracle(map)")`` is shown the true map instead (``slam.oracle_map``).
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import os

@@ -4,8 +4,6 @@
 ``make test-fast`` leaves out all that have one: ``pytest -m "not (slow or docs or ...)"``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/extending.md does what it says: each recipe is followed literally, in an empty folder."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """README and docs do what they say: their Python blocks run, their links lead somewhere."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -4,8 +4,6 @@
 ``make docs`` builds it (mkdocs is no part of the test environment).
 """
 
-from __future__ import annotations
-
 import re
 import shlex
 from pathlib import Path

@@ -5,8 +5,6 @@ The run (of odometry in the arena, unless a verb of ``mobilia`` and its options 
 without compiled code, then again with what that left.
 """
 
-from __future__ import annotations
-
 import os
 import resource
 import subprocess

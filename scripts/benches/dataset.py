@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rows of ``mobilia bench`` about datasets: making, reading, sizes."""
 
-from __future__ import annotations
-
 import tempfile
 import time
 from collections.abc import Iterator

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison's tables, looked up by scene, level and SLAM, and what may be said of them."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from collections.abc import Container

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia bench``: speed figures of this machine, as a table and as JSON."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable
 from functools import partial

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia drive``: a robot steered by its SLAM's estimate, goal by goal, in rooms that move."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict
 from pathlib import Path

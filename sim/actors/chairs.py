@@ -13,8 +13,6 @@ freedoms are joints in a row: x, y, yaw as at the planar level, so that these st
 addresses of a chair for everyone who pushes, avoids or draws it, then height, pitch and roll.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace

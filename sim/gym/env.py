@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The moving rooms as a Gymnasium environment."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -5,8 +5,6 @@ Whatever has no need of this project is Gymnasium's: ``gymnasium.wrappers.FrameS
 stacks what these give.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rules of a closed loop."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from slam.settings import Settings, number, word

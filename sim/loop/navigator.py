@@ -6,8 +6,6 @@ the same two that drive recorded episodes, there by truth. The grid is the scene
 the map that the SLAM has so far, in the world frame, reached through the known start.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

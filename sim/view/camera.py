@@ -9,8 +9,6 @@ so that it works whatever ``MUJOCO_GL`` was when mujoco was imported. A camera b
 that made it. People between a camera that rides on the robot and the robot are drawn as glass.
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import Any, Self
 

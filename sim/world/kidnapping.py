@@ -5,8 +5,6 @@ It is put to where it stood earlier on its tour, at the same heading, so what it
 mapped. It stands still at first, and its wheels have not rolled on the way.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -8,8 +8,6 @@ can be made without those before it. What that simplifies: whatever is pushed ab
 is put back before the next arrangement, and within a session nothing changes out of sight.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace

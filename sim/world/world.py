@@ -5,8 +5,6 @@ What a substep is, is in ``sim.world.substeps``. Whoever moves things by hand (`
 between two of them calls ``mj_forward`` then.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -7,8 +7,6 @@ alignment "none" expresses the truth in the frame of that known first pose and m
 is fair only to references without a common origin. Inputs are never changed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal, get_args

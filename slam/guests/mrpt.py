@@ -8,8 +8,6 @@ writes, but for ``CSensoryFrame`` (2), which it reads too. It is not compressed:
 MRPT opens it, reads such files as they are.
 """
 
-from __future__ import annotations
-
 import math
 import shutil
 import struct

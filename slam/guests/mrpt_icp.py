@@ -6,8 +6,6 @@ arena and station, still and at motion 0.5): every scan is matched, by every poi
 0.15 m apart, and goes into the map each 0.5 m or 20 degrees.
 """
 
-from __future__ import annotations
-
 from slam.guests.mrpt import MotionModel, MrptSlam
 from slam.system import register
 

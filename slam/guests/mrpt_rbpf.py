@@ -10,8 +10,6 @@ particles were no better than 15. ICP to points as the proposal was best in stil
 and flew off by tens of metres among movers: it does not weigh odometry.
 """
 
-from __future__ import annotations
-
 from slam.guests.mrpt import MotionModel, MrptSlam
 from slam.system import register
 

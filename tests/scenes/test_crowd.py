@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a crowd may be called, where it is put, and that it leaves the rest of a scene alone."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np

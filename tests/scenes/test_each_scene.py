@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What one scene promises and no other."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

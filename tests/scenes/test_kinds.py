@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One row a kind of furniture: a part and its row are all that a new kind takes."""
 
-from __future__ import annotations
-
 import ast
 from pathlib import Path
 

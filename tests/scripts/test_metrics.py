@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One row a metric: every command takes it from the table, and nobody keeps a list of his own."""
 
-from __future__ import annotations
-
 import ast
 import math
 from dataclasses import replace

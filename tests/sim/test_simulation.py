@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames and moments of the moving world: one seed, same bytes; each says what is, and when."""
 
-from __future__ import annotations
-
 import subprocess
 import sys
 from collections.abc import Callable

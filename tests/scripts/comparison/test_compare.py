@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison as a whole: same frames for all, resumed to the same numbers, failures scored."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

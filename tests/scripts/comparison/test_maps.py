@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores of maps on a room made by hand: known ghosts, known new places."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

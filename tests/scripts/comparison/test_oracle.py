@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An oracle in a comparison: labels reach it through the recording, and nobody else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

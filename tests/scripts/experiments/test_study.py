@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Studies: what is run once, what is pooled, and what each of them declares."""
 
-from __future__ import annotations
-
 import importlib
 import re
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps for pictures: thin walls stay, in no more cells than a picture has room for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

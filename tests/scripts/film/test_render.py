@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Films of runs, episodes and logs: the promised size, rate and length, with and without GL."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is served is what is run: the same scans, whoever watches; logs as well."""
 
-from __future__ import annotations
-
 import math
 from itertools import islice
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results on a page: tables between marks, pictures small and beside it."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 

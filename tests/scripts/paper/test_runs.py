@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Runs: what they depend on, what they keep, and the numbers over seeds."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line as people meet it: the whole run, and every wrong input as one clear line."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess

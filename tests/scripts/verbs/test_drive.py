@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia drive``: tables of every run, made where they are missing and found where not."""
 
-from __future__ import annotations
-
 import csv
 import json
 

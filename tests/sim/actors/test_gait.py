@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Legs: planted feet stay planted, links keep their length, a walker who stops stands."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

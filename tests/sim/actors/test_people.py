@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """People and doors of the office: where they go, what they respect, what gives way to them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Change out of sight: as much as was asked for, never in view, never into anything."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np

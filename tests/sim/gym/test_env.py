@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The contract of the Gymnasium environments, checked as registered ones."""
 
-from __future__ import annotations
-
 import math
 
 import gymnasium

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals, rewards and steps of several scans: where goals lie, what is paid, what is refused."""
 
-from __future__ import annotations
-
 import math
 import re
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The closed loop: only the estimate steers, truth only scores, whatever the SLAM does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

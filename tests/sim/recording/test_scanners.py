@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of every scanner are what was seen live: bags, CARMEN logs, recipes, episodes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Odometry: exact without error, and errors that are as large as it says they are."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Truth per beam: what was hit, whether it moves, how far it has moved since it was last seen."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

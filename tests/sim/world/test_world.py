@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The moving world: seeds, stillness, shoves, drive, saved states."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 

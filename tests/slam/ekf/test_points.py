@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The world of points: what its stream says is what its truth and noise are."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

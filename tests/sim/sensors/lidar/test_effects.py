@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each effect of the range model by itself, against what the manufacturer says of it."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import fields, replace
 from types import SimpleNamespace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages per mirror turn as the ROS driver makes them; the serial link's printed losses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

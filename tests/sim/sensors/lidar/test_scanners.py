@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scanner models: data sheets, beam times against closed forms, names, files from outside."""
 
-from __future__ import annotations
-
 import importlib
 import math
 import sys
