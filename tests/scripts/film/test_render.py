@@ -13,7 +13,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from scripts.cli import app
-from scripts.film.encode import FILM_S, Pace, size_of
+from scripts.film.encode import size_of
 from scripts.film.footage import of_scene, open_run
 from scripts.film.map_pane import RobotScan
 from scripts.film.panes import Layout
@@ -175,13 +175,6 @@ def test_beams_have_the_colour_of_what_they_hit_and_the_legend_says_which():
     assert (beam_colors(labelled().without_truth())[:4] == BLUE).all()
 
 
-def test_a_pace_counts_its_pictures():
-    pace = Pace(fps=30.0, speed=2.0, from_s=1.0, to_s=3.0)
-    assert [pace.due(t) for t in (0.99, 1.0, 2.0, 3.0, 9.0)] == [0, 1, 16, 31, 31]
-    assert Pace.within_a_minute(20.0).speed == 1.0
-    assert Pace.within_a_minute(10.0 * FILM_S).speed == 10.0
-
-
 @pytest.mark.parametrize("words", ["1280", "1280x721", "0x0", "1280x99999", "axb", "-1280x720"])
 def test_a_size_is_two_even_numbers(words: str):
     with pytest.raises(InvalidValueError, match="--size must be"):
@@ -266,15 +259,6 @@ def test_pictures_stand_side_by_side_in_the_order_of_time(tmp_path: Path):
         cell = whole[6 + LABEL : 6 + LABEL + 45, x : x + 80]
         assert (cell == level).all()
         assert whole[6 : 6 + LABEL, x : x + 80].min() < 200  # its time is written above it
-
-
-def test_many_moments_go_over_several_lines(tmp_path: Path):
-    pictures = [plain(k) for k in range(5)]
-    whole = strip(
-        pictures, [float(k) for k in range(5)], tmp_path / "s.png", columns=3, cell_width=160
-    )
-    assert whole.shape[1] == 2 * MARGIN + 3 * 160 + 2 * GAP
-    assert set(range(5)) <= set(np.unique(whole).tolist())
 
 
 def test_evenly():
