@@ -72,16 +72,6 @@ def test_links_keep_their_length_and_the_knee_joins_them():
         assert soles.max() < gait.SOLE + gait.LIFT + 1e-9
 
 
-def test_knees_bend_forwards():
-    walker = Walker(0.0)
-    for _ in range(600):
-        walker.step(1.0)
-        hips, soles = walker.pos[[0, 2]], walker.ends(gait.SHANK, (1, 3))
-        share = (hips[:, 2] - walker.pos[[1, 3], 2]) / (hips[:, 2] - soles[:, 2])
-        on_line = hips[:, 0] + share * (soles[:, 0] - hips[:, 0])
-        assert np.all(walker.pos[[1, 3], 0] >= on_line - 1e-9)
-
-
 def test_who_stops_ends_with_the_feet_under_the_hips():
     walker = Walker(1.0)
     for k in range(900):

@@ -98,15 +98,6 @@ def test_a_goal_that_cannot_be_reached_is_refused_with_one_that_can(scene):
     assert info["goal"] is not None
 
 
-@pytest.mark.parametrize("scene", ["office", "apartment"])
-def test_the_goals_of_a_scene_can_be_reached(scene):
-    env = MobiliaEnv(scene)
-    env.reset(seed=0)
-    ground = Ground(env.simulation.world)
-    for goal in env.simulation.world.scene.goals.values():
-        ground.checked(goal)
-
-
 def ahead(reward: str, frame_skip: int = 1, speed: float = 1.0, steps: int = 200):
     """Rewards of a drive straight to a goal 1.2 m ahead, and the last information."""
     env = make(dynamism=0.0, reward=reward, frame_skip=frame_skip)

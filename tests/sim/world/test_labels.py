@@ -57,14 +57,6 @@ def test_a_chair_that_rests_rolls_and_was_moved_unseen():
     assert (moved == moved[0]).all()
 
 
-def test_a_wall_met_head_on_has_no_incidence():
-    simulation, *_ = lone(laser=Lms221Config.ideal())
-    labels = simulation.observe().labels
-    static = labels.kind == BeamClass.STATIC
-    assert labels.incidence[static].min() < math.radians(1.0)
-    assert labels.incidence[static].max() <= math.pi / 2.0
-
-
 def test_mixed_pixels_are_marked_at_edges_and_only_there():
     simulation, *_ = lone(laser=Lms221Config())
     put(simulation, 1.5, 1.5)

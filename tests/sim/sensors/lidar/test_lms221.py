@@ -27,30 +27,6 @@ def scan(
     return lidar.observe(room.stepper(model, data, twist), data), lidar
 
 
-@pytest.mark.parametrize(
-    ("resolution", "fov", "beams", "rate"),
-    [  # TD p10, TL p19, p47-48
-        (1.0, 180, 181, 75.0),
-        (0.5, 180, 361, 37.5),
-        (0.25, 180, 721, 18.75),
-        (1.0, 100, 101, 75.0),
-        (0.5, 100, 201, 37.5),
-        (0.25, 100, 401, 18.75),
-    ],
-)
-def test_beams_and_rates_are_those_of_the_data_sheet(
-    resolution: float, fov: int, beams: int, rate: float
-) -> None:
-    config = Lms221Config(resolution_deg=resolution, fov_deg=fov)
-    spec = config.spec()
-    assert spec.n_beams == beams
-    assert config.rate_hz == pytest.approx(rate)
-    assert math.degrees(spec.angle_min) == pytest.approx(-fov / 2)
-    assert math.degrees(spec.angles[-1]) == pytest.approx(fov / 2)
-    assert spec.beam_time_offsets[0] == 0.0
-    assert spec.sweep_duration <= (config.turns - 0.5) / 75.0 + 1e-9
-
-
 def test_half_degree_beams_come_from_the_second_turn() -> None:
     offsets = Lms221Config(resolution_deg=0.5).spec().beam_time_offsets
     whole, half = offsets[0::2], offsets[1::2]

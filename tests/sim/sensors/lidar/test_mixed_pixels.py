@@ -44,13 +44,6 @@ def test_which_models_have_a_spot() -> None:
     assert all((len(m.spot.weights) > 1) == m.mixed_pixels for m in models.values())
 
 
-def test_the_spot_of_the_tim561_is_that_of_its_instructions() -> None:
-    """SICK's example: 64.6 mm wide and 41.4 mm high at 4 m, 7 mm at the cover."""
-    spot, _, _ = bare("tim561")
-    assert spot.size_at(0.0) == pytest.approx((0.007, 0.007))
-    assert spot.size_at(4.0) == pytest.approx((0.0646, 0.0414), abs=1e-5)
-
-
 @pytest.mark.parametrize("gap_m", [0.3, 0.6])
 def test_an_edge_mixes_within_the_footprint_and_nowhere_else(
     room: SimpleNamespace, gap_m: float
