@@ -57,7 +57,7 @@ def drive(
     from scripts.closed_loop.make import carry_out, said, success_table
     from scripts.closed_loop.plan import RUNS, Plan
     from scripts.pages.page import Page, Part, command, publish
-    from sim.loop.config import LoopConfig
+    from sim.loop import LoopConfig
 
     workers.check_jobs(jobs)
     axis, at, held = options.axis_levels(dynamism, motion, change)

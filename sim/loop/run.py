@@ -13,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.core.contacts import Contact
-from sim.loop.config import LoopConfig
-from sim.loop.navigator import Decision, Navigator
+from sim.loop.navigator import Decision, LoopConfig, Navigator
 from sim.simulation import Simulation
 from sim.world.world import World
 from slam import se2
