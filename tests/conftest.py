@@ -14,8 +14,6 @@ MARKS: dict[str, tuple[str, ...]] = {
     "golden": ("golden/",),
     # pages, pictures and results of docs/: red when a page lags behind the code
     "docs": (
-        "scripts/experiments/test_study.py::test_every_experiment_has_a_line",
-        "scripts/experiments/test_study.py::test_every_module_is_named_on_a_page",
         "scripts/paper/test_quote.py",
         "scripts/test_marks.py",
         "test_bring_your_own.py",

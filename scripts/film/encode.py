@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """H.264 films without a window: pictures are composed as arrays and piped to ffmpeg."""
 
-from __future__ import annotations
-
 import math
 import re
 import subprocess
@@ -86,12 +84,12 @@ class Pace:
             )
 
     @classmethod
-    def within_a_minute(cls, duration_s: float, fps: float = FPS) -> Pace:
+    def within_a_minute(cls, duration_s: float, fps: float = FPS) -> "Pace":
         """Real time, faster where the film would last longer than ``FILM_S``."""
         return cls(fps=fps, speed=max(1.0, duration_s / FILM_S))
 
     @classmethod
-    def of_log(cls, duration_s: float, scans: int) -> Pace:
+    def of_log(cls, duration_s: float, scans: int) -> "Pace":
         """Real time up to a minute, no picture oftener than scans; longer logs in time-lapse.
 
         One picture for ``SCANS_A_PICTURE`` scans, at most ``MOST_PICTURES``: it costs less than
@@ -113,7 +111,7 @@ class Pace:
 
 
 @contextmanager
-def film(path: Path, fps: float, *, crf: int = CRF, preset: str = PRESET) -> Iterator[Film]:
+def film(path: Path, fps: float, *, crf: int = CRF, preset: str = PRESET) -> "Iterator[Film]":
     """A film that appears under ``path`` when the block ends well, and not at all otherwise.
 
     crf     H.264's constant rate factor: more is coarser and smaller

@@ -8,8 +8,6 @@ seed, the share and the number of chairs, not on what a chair meets: one that is
 heading by the golden angle, without a draw, until it gets away.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

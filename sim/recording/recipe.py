@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recipe of an episode: about 1 KB from which the same bytes can be made again."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import json
@@ -184,7 +182,7 @@ class Recipe:
             **self.options,
         }
 
-    def of_twin(self, twin: str) -> Recipe:
+    def of_twin(self, twin: str) -> "Recipe":
         """The same for another version of its drive."""
         return replace(self, twin=twin)
 

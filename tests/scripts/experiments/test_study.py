@@ -112,6 +112,3 @@ def test_cells_of_tracks_are_geometric_means_and_losses_are_counted():
     head, _, whole, *_ = ablation.STUDY.markdown(rows).splitlines()
     assert head == "| slam | tour-guide-v1 | no-walls-v1 | all |"
     assert whole == "| shunting | 2.00, 1 of 2 | 1.00, 0 of 1 | 1.41 |"
-
-
-ROOT = Path(__file__).parents[3]
