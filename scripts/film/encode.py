@@ -16,6 +16,7 @@ from scripts.film import FPS
 from sim.view.draw import Picture
 from slam.errors import InvalidValueError, MissingDependencyError, OutputError
 from slam.files import reason, replacing
+from slam.shaped import within
 
 Size = tuple[int, int]
 
@@ -73,10 +74,8 @@ class Pace:
     preset: str = PRESET
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.fps <= 240.0:
-            raise InvalidValueError(f"fps must lie in 1..240, got {self.fps}")
-        if not 0.01 <= self.speed <= MOST_SPEED:
-            raise InvalidValueError(f"speed must lie in 0.01..{MOST_SPEED:g}, got {self.speed}")
+        within("fps", self.fps, 1.0, 240.0)
+        within("speed", self.speed, 0.01, MOST_SPEED)
         if not 0.0 <= self.from_s < self.to_s:
             raise InvalidValueError(
                 f"a film must go from 0 s or later to a later moment, got {self.from_s} to "
