@@ -6,8 +6,6 @@ too. Nothing is imported here but what Python itself has loaded by now: the work
 may be on the path, may hold a module of any name.
 """
 
-from __future__ import annotations
-
 import os
 import sys
 

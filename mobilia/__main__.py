@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The console command ``mobilia``."""
 
-from __future__ import annotations
-
 import sys
 
 import mobilia

@@ -12,7 +12,7 @@ from importlib import import_module
 from typing import TYPE_CHECKING, Any
 
 if TYPE_CHECKING:
-    from scenes.filling import filled
+    from scenes.recipe import filled
     from scenes.registry import build, describe, names, register
     from scenes.scene import Mover, Scene, at_scan_height
 
@@ -21,7 +21,7 @@ SCAN_HEIGHT = 0.36
 _WHERE = {
     **dict.fromkeys(("build", "describe", "names", "register"), "registry"),
     **dict.fromkeys(("Mover", "Scene", "at_scan_height"), "scene"),
-    "filled": "filling",
+    "filled": "recipe",
 }
 
 __all__ = [

@@ -5,8 +5,6 @@ Goals, doorways and the robot's start stay clear, and so do the ways between the
 stands at these places, the robot can do its tour.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence
@@ -182,7 +180,7 @@ class Places:
 
 
 @functools.lru_cache(maxsize=8)
-def _by_content(key: _Key) -> Places:
+def _by_content(key: "_Key") -> Places:
     return Places(key.scene)
 
 

@@ -7,8 +7,6 @@ Attaching costs more the bigger the scene is, so parts first meet in a spec of t
 all whose names differ in the number only ("chair0", "chair1", ...).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What moves, added to a copy of a plan: chairs, people, bins, door leaves, the robot."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 
 import mujoco

@@ -6,8 +6,6 @@ scene (``scenes.crowd_kinds``). Here is how many of each kind there are: as a te
 usual for a scene at a level of motion.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, fields
 from typing import Annotated

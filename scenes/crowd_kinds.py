@@ -6,8 +6,6 @@ else is in the scene stays as it is. What they do is ``Role`` and ``Hold``; ``si
 carries it out.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The true map: what never moves, cut at the scan plane."""
 
-from __future__ import annotations
-
 from functools import lru_cache
 
 import mujoco

@@ -5,8 +5,6 @@ The path of such a file is the name of a scene wherever one is asked for. A file
 no code.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import lru_cache

@@ -4,8 +4,6 @@
 The physics reads ``group`` and ``feet``, the bag ``height_m``; pictures draw the part itself.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import Literal
 

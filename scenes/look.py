@@ -5,8 +5,6 @@ Floors are painted by numpy into textures that live in the model: no image files
 an (n, n, 3) float image in [0, 1] that tiles seamlessly. No recorded value depends on a pixel.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Mapping, Sequence

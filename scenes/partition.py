@@ -5,8 +5,6 @@ Each cut parts one region in two, so one opening per cut joins all rooms: by ind
 the two sides of each are joined through it. Any two rooms that share enough wall may get another.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where there is room for a disc: static boxes, discs already placed, doorways to keep clear."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

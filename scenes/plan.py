@@ -5,8 +5,6 @@ A plan is the same for all seeds of most scenes, so it is made once per process 
 move are added to copies of it (``scenes.builder``).
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator, Sequence
@@ -258,7 +256,7 @@ class Plan:
             if geom.name.partition(":")[0] in look.WALLS:
                 geom.group = HIDDEN
 
-    def finish(self) -> Plan:
+    def finish(self) -> "Plan":
         """Put the parts in, dress the walls, add cameras where none are.
 
         Raises ``InvalidValueError`` for marks and materials that there are not.

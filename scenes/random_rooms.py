@@ -5,8 +5,6 @@ The seed cuts a rectangle into rooms (``scenes.partition``), gives each a purpos
 furniture that would part a room's doors or its middle from one another is not put there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from functools import cache

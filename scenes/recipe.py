@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Steps the recipes share: seeded streams, counts, chairs, people, doors, the finished Scene."""
+"""Steps the recipes share: seeded streams, counts, chairs, people, doors, the finished Scene.
 
-from __future__ import annotations
+``filled`` is the recipe of a plan alone; ``arena``, ``office`` and the others have options of their
+own.
+"""
 
 import math
 from collections.abc import Mapping, Sequence
 from functools import cache
+from pathlib import Path
 from typing import Annotated
 
 import numpy as np
@@ -14,10 +17,10 @@ from msgspec import Meta
 from scenes import look
 from scenes.assembly import reach_of
 from scenes.builder import Builder
-from scenes.kinds import KINDS
+from scenes.kinds import KINDS, kind_of
 from scenes.marks import Mark
 from scenes.placement import Floor
-from scenes.plan import Plan
+from scenes.plan import Plan, furniture
 from scenes.scene import Kind, Pose, Scene
 from slam.errors import InvalidValueError
 from slam.shaped import one_of, shaped
@@ -260,3 +263,37 @@ def _anywhere(floor: Floor, kind: Kind, field: str, n: int, rng: np.random.Gener
     if place is None:
         raise InvalidValueError(f"{field} = {n} does not fit on the floor of this scene")
     return place[0], place[1], float(rng.uniform(-math.pi, math.pi))
+
+
+def filled(  # noqa: PLR0913 (the counts of a scene, each by name)
+    plan: str | Path,
+    seed: int,
+    *,
+    parts: Sequence[str | Path] = (),
+    put: Sequence[tuple[str | Path, Pose]] = (),
+    n_chairs: int = 0,
+    n_people: int = 0,
+    loads: Mapping[str, int] | None = None,
+    doors: str = "open",
+) -> Scene:
+    """The scene of a plan: furniture, doors and bins at its marks, then chairs and people.
+
+    plan    path of an MJCF file, or the name of one of ``scenes/plans``
+    parts   paths of MJCF files of furniture: each is put wherever a mark starts with its name
+    put     furniture where no mark is: (path or name, (x m, y m, yaw rad)), its back to +y
+    loads   how many of each kind that is pushed about, ``spot:KIND:N`` marks first: {"trolley": 2}
+    doors   how they rest: "open", "ajar", "closed" or "mixed"
+
+    Chairs take the ``seat:...`` marks first, then free floor. Raises ``InvalidValueError`` for a
+    file, mark, material or number that cannot be, ``UnknownNameError`` for a kind of load.
+    """
+    n_chairs, n_people = count("n_chairs", n_chairs, 0), count("n_people", n_people, 0)
+    more = tuple((str(part), (pose[0], pose[1], pose[2])) for part, pose in put)
+    walls = planned(str(plan), (*map(str, parts), *furniture()), put=more)
+    for kind in loads or {}:
+        kind_of(kind)  # an unknown one is refused with the kinds that there are
+    loaded = {kind: count(f"loads[{kind!r}]", n, 0) for kind, n in (loads or {}).items()}
+    builder = furnished(walls, Draws(seed), n_chairs, n_people, doors, loaded)
+    options: dict[str, object] = {"n_chairs": n_chairs, "n_people": n_people, "doors": doors}
+    options |= {"loads": dict(loads)} if loads else {}
+    return finish(builder, Path(plan).stem, seed, options)

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a recipe hands to the world: a model to compile and the facts a simulator needs about it."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a TOML file of a scene says, checked before anything is built (docs/scenes.md)."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import tomllib

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The console command's first breath: Ctrl-C is understood before the slow imports begin."""
 
-from __future__ import annotations
-
 import os
 import sys
 

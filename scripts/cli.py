@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The console command ``mobilia``: parse, call, print. Each verb lives in a module of its own."""
 
-from __future__ import annotations
-
 import logging
 import os
 import sys

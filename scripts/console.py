@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the verbs print: a rich console for results, one for errors, one progress bar."""
 
-from __future__ import annotations
-
 import logging
 import sys
 import threading

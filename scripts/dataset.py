@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A dataset as a whole: the episodes that are missing, on all processes, with a progress bar."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable
 from functools import partial

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Still figures: trajectories, errors and map of a run; what all curves against a level share."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager

@@ -4,8 +4,6 @@
 Of a file: those that it imports from its own folder or package. Of a job: ``code_of``.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib.util
 import inspect

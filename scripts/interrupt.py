@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ctrl-C and kill: unwind everything, so that what is half-written is removed on the way."""
 
-from __future__ import annotations
-
 import signal
 from types import FrameType
 

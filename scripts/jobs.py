@@ -8,8 +8,6 @@ it calls, so what is found there is what would be written, and is not made again
 content lies beside it, as ``<file>.sha256``: one that was damaged since is made again.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os
@@ -60,7 +58,7 @@ class Job:
                 f"Job.name must be letters, digits, '-', '_' and '.', got {self.name!r}"
             )
 
-    def over(self, what: str, arguments: Mapping[str, Any]) -> Job:
+    def over(self, what: str, arguments: Mapping[str, Any]) -> "Job":
         """The same on what is called so, and these arguments besides."""
         return replace(self, name=f"{what}_{self.name}", arguments={**self.arguments, **arguments})
 

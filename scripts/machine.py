@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a number was made: versions of what can change it, and the machine."""
 
-from __future__ import annotations
-
 import os
 import platform
 import sys

@@ -8,8 +8,6 @@ all of the line for HTML.
 A page has no long tables: their rows go to CSV files in ``docs/results``, which the page links.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import os

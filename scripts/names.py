@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names that are typed, and names of outputs: all that a verb needs before its slow imports."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a command line is read: lists, names that a shell completes, errors that name options."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Mapping, Sequence
 from importlib import import_module

@@ -4,8 +4,6 @@
 With them: of which axis of ``sim.core.dynamism`` the levels of ``compare`` and ``drive`` are.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass

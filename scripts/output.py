@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Output folders that appear whole or not at all, and the recipe that says what made them."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

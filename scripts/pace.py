@@ -4,8 +4,6 @@
 The rates lie in the user's cache folder, in no result; who loses them loses estimates only.
 """
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results files: small, with a line for each thing measured, and the commit that made them."""
 
-from __future__ import annotations
-
 import json
 import math
 import subprocess

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Is what a verb left still what it left: a dataset, an episode, a run, a comparison, a map."""
 
-from __future__ import annotations
-
 import json
 import os
 from collections.abc import Callable

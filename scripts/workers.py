@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The same call over many items: here, on processes of this machine, or on a Dask cluster."""
 
-from __future__ import annotations
-
 import ctypes
 import importlib
 import os

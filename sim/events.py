@@ -7,8 +7,6 @@ for moment in toured(simulation, 60.0):
 watch.events()
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames with what a recording also holds: where everything was at the stamp."""
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass, replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """World + scanner + encoders = frames, the same for every listener."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, replace
@@ -13,7 +11,6 @@ import numpy as np
 from sim.actors.rearranging import Rearrangement
 from sim.actors.robot import DriveConfig
 from sim.core import state
-from sim.core.checks import number
 from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
@@ -39,6 +36,7 @@ from slam.frames import (
     Stream,
     StreamMetadata,
 )
+from slam.shaped import Positive, shaped
 
 # Of a state, by their words in it.
 _PARTS = {
@@ -324,9 +322,7 @@ def checked_moment(change_at_s: float | None, session: int | None = None) -> flo
     So it is in a session, within which nothing changes out of sight.
     """
     if change_at_s is not None:
-        number("change_at_s", change_at_s)
-        if not change_at_s > 0.0:
-            raise InvalidValueError(f"change_at_s must be > 0, got {change_at_s}")
+        shaped("change_at_s", change_at_s, Positive)
         if session is not None:
             raise InvalidValueError(
                 f"change_at_s and session exclude each other: {change_at_s:g} and {session}"

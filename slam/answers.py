@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a SLAM answers, judged: whatever is no estimate, map or trajectory is its failure."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from contextlib import contextmanager
 from typing import TypeVar

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """NumPy archives (.npz) as data: bounded before they are unpacked, one error for all damage."""
 
-from __future__ import annotations
-
 import math
 import struct
 import warnings

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files read whole, once their size is known to be one that such a file may have."""
 
-from __future__ import annotations
-
 import json
 import stat
 import tomllib

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a number must be before it enters a type: shape, finite, a possible covariance."""
 
-from __future__ import annotations
-
 import math
 from typing import Any, TypeGuard
 

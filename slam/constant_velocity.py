@@ -6,8 +6,6 @@ where it is now; the one that asks for least is that it moves on as it moved bet
 estimates. It knows nothing of how that will change: its covariance says so.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 import numpy as np

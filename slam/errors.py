@@ -5,8 +5,6 @@ Every message names the file or field, the value, and what was expected. It is o
 characters, whatever a guest or a file says in it.
 """
 
-from __future__ import annotations
-
 import difflib
 from collections.abc import Iterable
 from pathlib import Path
@@ -102,7 +100,7 @@ class SlamFailedError(MobiliaError):
         """So that it comes back whole from another process."""
         return type(self), (self.message, self.outcome)
 
-    def at(self, where: str) -> SlamFailedError:
+    def at(self, where: str) -> "SlamFailedError":
         """The same failure, with the place before its words."""
         return type(self)(f"{where} {self.message}", self.outcome)
 

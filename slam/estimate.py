@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a SLAM says: where the robot is, and what its map is, as cells or as landmarks."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any

@@ -6,8 +6,6 @@ bytes are synced to the disk, it is renamed, and the folder that holds the name 
 each finished thing. What lies in a folder of such a name is synced with the folder, not singly.
 """
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import fcntl

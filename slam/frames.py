@@ -7,8 +7,6 @@ frame read back from a recording are equal. Frames follow REP 103 (x forward, y 
 counter-clockwise) and REP 105 (map, odom, robot = base_link, laser); ``T_a_b`` maps b to a.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterable, Iterator, Mapping
 from dataclasses import dataclass, field, replace
@@ -347,7 +345,7 @@ class Frame(ByContent):
         """Seconds."""
         return to_s(self.stamp_ns)
 
-    def without_truth(self) -> Frame:
+    def without_truth(self) -> "Frame":
         """The same frame as a robot would get it: no truth, no labels, no feature identities."""
         features = self.features
         if features is not None and features.ids is not None:

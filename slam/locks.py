@@ -9,8 +9,6 @@ machines where the mount has them (not with ``nolock`` or ``local_lock``), for w
 each.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import time

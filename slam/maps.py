@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps as files: PGM + YAML as the map_server of ROS 1 and nav2 loads them, and as a picture."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 import os

@@ -8,8 +8,6 @@ nothing else, until ``trusted`` makes a name of it as if it had been typed. docs
 whole rule.
 """
 
-from __future__ import annotations
-
 import ast
 import importlib
 import os
@@ -32,7 +30,7 @@ class NameFromFile(str):
 
     file: str
 
-    def __new__(cls, text: str, file: str | Path) -> NameFromFile:
+    def __new__(cls, text: str, file: str | Path) -> "NameFromFile":
         """``text`` of ``file``."""
         name = super().__new__(cls, text)
         name.file = str(file)

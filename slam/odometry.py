@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The null system: odometry alone. Every other SLAM is measured against it."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from slam import se2

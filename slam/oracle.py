@@ -8,16 +8,15 @@ does not tell where the robot is. It is a bound, no contestant: nobody else is s
 moves now (``slam.variants.oracle_of``).
 """
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.errors import InvalidValueError, NeedsLabelsError
+from slam.errors import NeedsLabelsError
 from slam.estimate import Estimate, Raster
 from slam.frames import BeamClass, Frame, Scan
+from slam.shaped import one_of
 from slam.system import SlamSystem
 from slam.trajectory import Trajectory
 from slam.variants import ORACLE, TAKEN_OUT
@@ -46,11 +45,7 @@ class Oracle:
     """
 
     def __init__(self, slam: SlamSystem, takes_out: str = TAKEN_OUT[0]) -> None:
-        if takes_out not in KINDS:
-            raise InvalidValueError(
-                f"Oracle.takes_out must be one of {', '.join(KINDS)}, got {takes_out!r}"
-            )
-        self.slam, self.takes_out = slam, takes_out
+        self.slam, self.takes_out = slam, one_of("Oracle.takes_out", takes_out, KINDS)
         for name in OPTIONAL:
             if hasattr(slam, name):
                 setattr(self, name, getattr(slam, name))

@@ -11,8 +11,6 @@ stands around: then it looks for one where they do not, first nearby (a robot th
 push), then everywhere (one that was carried).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The path of a SLAM so far: stamps and poses of its frames, which come in order."""
 
-from __future__ import annotations
-
 from array import array
 
 import numpy as np

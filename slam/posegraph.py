@@ -7,8 +7,6 @@ Geman-McClure kernel with graduated non-convexity (Yang, Antonante, Tzoumas, Car
 all pull, then those that do not fit the others are let go of.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parts of a raster, and the same in fewer, wider cells: what files and pictures have room for."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

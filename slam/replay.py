@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Feed one stream to several SLAMs, frame by frame, and keep what each of them said."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
@@ -193,7 +191,7 @@ class Replay:
     _poses: list[Float] = field(default_factory=list)
 
     @classmethod
-    def of(cls, systems: Mapping[str, SlamSystem]) -> Replay:
+    def of(cls, systems: Mapping[str, SlamSystem]) -> "Replay":
         """A replay with one track per named system."""
         return cls({name: Track(name, system) for name, system in systems.items()})
 

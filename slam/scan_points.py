@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scan as points, for whoever writes a SLAM: ``from slam import deskewed, points_robot``."""
 
-from __future__ import annotations
-
 import numpy as np
 
 from slam.errors import InvalidValueError

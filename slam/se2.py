@@ -10,8 +10,6 @@ Sines and cosines come from ``math`` (libm) and products are written out, becaus
 recorded values.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``--set PATH=VALUE``: numbers put into the names of the SLAMs that run."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 

@@ -10,8 +10,6 @@ A ``Settings`` may hold others: together they are a tree. Every number has a pat
 whole.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import difflib
 import hashlib
@@ -154,7 +152,7 @@ class Settings:
         made: Self = getattr(cls, name)()
         return made
 
-    def differences(self, other: Settings) -> dict[str, Any]:
+    def differences(self, other: "Settings") -> dict[str, Any]:
         """By path: the numbers that are not as in ``other``, a tree of the same shape."""
         theirs = {row.path: row.value for row in other.rows()}
         return {row.path: row.value for row in self.rows() if row.value != theirs.get(row.path)}

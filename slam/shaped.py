@@ -8,8 +8,6 @@ laser = shaped("", {"yaw_deg": 400}, Laser)
 # InvalidValueError: yaw_deg must be a number from -360 to 360, got 400
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Collection

@@ -19,8 +19,6 @@ Who wants one of these asks whether it is there (``slam.replay.Track``), never f
 ``create("oracle(map)")`` is shown the true map instead (``slam.oracle_map``).
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import os
@@ -123,12 +121,12 @@ _registry: dict[str, Factory] = {}
 OWN = {
     "ekf": "slam.ekf.slam:EkfSlam",
     "genz-icp": "slam.guests.genz:GenzIcpSlam",
-    "icp-slam": "slam.guests.mrpt_icp:IcpSlam",
+    "icp-slam": "slam.guests.mrpt:IcpSlam",
     "karto": "slam.guests.karto:KartoSlam",
     "kiss-icp": "slam.guests.kiss:KissIcpSlam",
     "occupancy": "slam.grid.occupancy:OccupancySlam",
     "odometry": "slam.odometry:OdometrySlam",
-    "rbpf-slam": "slam.guests.mrpt_rbpf:RbpfSlam",
+    "rbpf-slam": "slam.guests.mrpt:RbpfSlam",
     "shunting": "slam.shunting.slam:ShuntingSlam",
     "shunting-features": "slam.shunting.featured:FeaturedShuntingSlam",
     "small-gicp": "slam.guests.gicp:SmallGicpSlam",

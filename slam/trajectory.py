@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A stamped sequence of poses, and the TUM file that evo reads."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from decimal import Decimal

@@ -6,8 +6,6 @@ words without quotes. An oracle (``slam.oracle``) has the name of the SLAM in it
 ``oracle(shunting{matching.reward=7},moving)``.
 """
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping
 from typing import Any

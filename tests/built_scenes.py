@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes for tests, built once, and what is asked of more than one of them."""
 
-from __future__ import annotations
-
 import math
 from functools import cache, lru_cache
 

@@ -4,8 +4,6 @@
 ``make test-fast`` leaves out all that have one: ``pytest -m "not (slow or docs or ...)"``.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Iterator
 from pathlib import Path
 
@@ -16,8 +14,6 @@ MARKS: dict[str, tuple[str, ...]] = {
     "golden": ("golden/",),
     # pages, pictures and results of docs/: red when a page lags behind the code
     "docs": (
-        "scripts/experiments/test_study.py::test_every_experiment_has_a_line",
-        "scripts/experiments/test_study.py::test_every_module_is_named_on_a_page",
         "scripts/paper/test_quote.py",
         "scripts/test_marks.py",
         "test_bring_your_own.py",

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of a film without the film."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 
 from scripts.film.render import Snapshots, shoot

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A Python of ours run to its end; which processes a test has started, wherever these went."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/bring_your_own.md does what it says: its blocks are run in order, in an empty folder."""
 
-from __future__ import annotations
-
 import csv
 import json
 import os

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who imports whom, within functions too: no file goes round, no package beside another either."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterator, Mapping
 from functools import cache

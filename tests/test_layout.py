@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each row of docs/layout.md leads to what it names."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

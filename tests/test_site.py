@@ -1,10 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The site: every page has its place, the gallery shows all there is, and its check finds faults.
+"""The site: every page has its place, its commands are commands, and its check finds faults.
 
 ``make docs`` builds it (mkdocs is no part of the test environment).
 """
-
-from __future__ import annotations
 
 import re
 import shlex
@@ -14,10 +12,7 @@ import pytest
 import typer
 import yaml
 
-import scenes
-from scripts.benchmark.tracks import newest
 from scripts.cli import app
-from scripts.experiments.pictures import with_clips
 from scripts.site.check import faults, main
 from scripts.site.columns import as_markdown
 
@@ -26,7 +21,6 @@ DOCS = REPO / "docs"
 CONFIG = yaml.safe_load((REPO / "mkdocs.yml").read_text())
 GENERATED = {"contributing.md", "changelog.md", "results.md"}  # by scripts/site/hooks.py
 JOBS = ["start.md", *(f"jobs/my_{job}.md" for job in ("slam", "dataset", "log", "policy", "scene"))]
-GALLERY = (DOCS / "gallery.md").read_text()
 
 
 def in_nav(entry: object) -> list[str]:
@@ -45,40 +39,6 @@ def test_the_site_is_strict_and_has_no_fonts_from_elsewhere():
     assert set(CONFIG["validation"].values()) == {"warn"}  # which strict makes errors: broken links
     assert CONFIG["theme"]["font"] is False
     assert not {"extra_javascript", "google_analytics", "repo_url"} & CONFIG.keys()
-
-
-def test_every_documented_module_is_there():
-    found = [name for page in (DOCS / "api").glob("*.md")
-             for name in re.findall(r"^::: ([\w.]+)$", page.read_text(), re.MULTILINE)]  # fmt: skip
-    assert len(found) == len(set(found)) > 30
-    for name in found:
-        assert (REPO / f"{name.replace('.', '/')}.py").is_file(), name
-        assert f"`{name}`" in (DOCS / "api" / "index.md").read_text(), name
-
-
-def test_the_gallery_shows_every_scene_and_every_track():
-    sections = {
-        part.partition("\n")[0]: part for part in re.split(r"^### ", GALLERY, flags=re.M)[1:]
-    }
-    assert set(sections) == {*scenes.names(), *newest()}
-    for name in scenes.names():
-        assert f"(pictures/scene_{name}.png)" in sections[name]
-        assert f"--scene {name} " in sections[name]
-    for name, track in newest().items():
-        section = sections[name]
-        assert f"(pictures/gallery/track_{name}.png)" in section
-        assert track.about[1:] in section
-        assert f"{track.axis}: {', '.join(says.split()[0] for says in track.says)}." in section
-        assert f"--tracks {name}\n" in section
-
-
-def test_the_gallery_links_the_clips_that_are_there(tmp_path: Path):
-    assert with_clips(GALLERY, DOCS / "pictures" / "gallery") == GALLERY
-    without = with_clips(GALLERY, tmp_path)
-    assert ".mp4" not in without
-    (tmp_path / "scene_arena.mp4").touch()
-    linked = "[![arena](pictures/scene_arena.png)](pictures/gallery/scene_arena.mp4)"
-    assert linked in with_clips(without, tmp_path).splitlines()
 
 
 GOOD = """<html><head><link rel="canonical" href="https://example.org/a">

@@ -4,8 +4,6 @@
 ``.ci/wheel`` goes on from here: an empty virtual environment, and the demo in it.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import subprocess

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Every file has tests that hold it, and every place in the table of marks has tests."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -7,8 +7,6 @@ of the pages. A line counts as a line of the file, blank ones too; the mean is o
 not blank.
 """
 
-from __future__ import annotations
-
 import io
 import json
 import subprocess

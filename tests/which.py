@@ -6,8 +6,6 @@ Of what is loaded by its name (scenes, guests, verbs) and of packages, those of 
 ``python -m pytest $(python -m tests.which FILE ...)`` runs them.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterator, Mapping
 from functools import cache

@@ -4,8 +4,6 @@
 Small on purpose: it checks a SLAM against known motion, it does not judge fidelity (that is sim's).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field
@@ -55,7 +53,7 @@ class Chairs:
     @classmethod
     def random(
         cls, count: int, area: Sequence[float], duration: float, moving: float, seed: int
-    ) -> Chairs:
+    ) -> "Chairs":
         """``moving``: share of the time a chair is on its way; area x0, y0, x1, y1."""
         rng = np.random.default_rng(seed)
         k = 2 * math.ceil(duration / 2.0) + 4

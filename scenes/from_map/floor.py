@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Free floor as rooms, spots to visit and passages between rooms."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a map to a plan: walls, things, rooms, spots to visit, doors."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where the floor of a building is, given its walls: start, spots to visit, rooms, passages."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 
@@ -46,7 +44,7 @@ class Survey:
 
 
 def survey(  # noqa: PLR0913 (what is known of a building)
-    cells: Cells,
+    cells: "Cells",
     free: Mask,
     walls: Float,
     things: Float,

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A plan of a map as files to read and edit: MJCF, and the recipe that fills it."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lines of a picture one cell wide, and the polylines that they are."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

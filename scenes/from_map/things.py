@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small things of a map, apart from its walls: legs of chairs, boxes, posts."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

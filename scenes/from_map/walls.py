@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Occupied cells as few long boxes."""
 
-from __future__ import annotations
-
 import heapq
 import math
 from itertools import pairwise
@@ -83,7 +81,7 @@ def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float, *, few: bool) ->
     return _needed(pool, occupied, cell_m, FEW_ENOUGH)
 
 
-def _joined(boxes: Float, around: _Around, near: NDArray[np.uint8], cell_m: float) -> Float:
+def _joined(boxes: Float, around: "_Around", near: NDArray[np.uint8], cell_m: float) -> Float:
     """Boxes for two that lie on one line and touch; ``near``: cells beside what is occupied."""
     ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])])
     ends = boxes[:, None, :2] + boxes[:, 2, None, None] * ahead[:, None] * [[-1.0], [1.0]]
@@ -114,7 +112,7 @@ def _bare(box: Float, near: NDArray[np.uint8], cell_m: float) -> int:
 
 
 def _dotted(
-    boxes: Float, around: _Around, occupied: Mask, near: NDArray[np.uint8], cell_m: float
+    boxes: Float, around: "_Around", occupied: Mask, near: NDArray[np.uint8], cell_m: float
 ) -> Float:
     """Boxes along straight rows of cells, with gaps, that no long box covers."""
     left = occupied.astype(np.uint8)

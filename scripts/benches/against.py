@@ -5,8 +5,6 @@ A ratio of processor times outlives the machine and what else runs on it, where 
 ours and a peer's take turns in blocks, and each pair of blocks gives one ratio.
 """
 
-from __future__ import annotations
-
 import importlib
 import json
 import math

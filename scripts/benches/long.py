@@ -5,8 +5,6 @@ Without a log, the robot tours the station at motion 1. A log is driven there an
 that a minute of it becomes hours of one building.
 """
 
-from __future__ import annotations
-
 import argparse
 import time
 from collections.abc import Iterator

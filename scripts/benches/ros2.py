@@ -5,8 +5,6 @@ The office with shunting runs at 1 x real time; a process beside it takes each s
 and notes when. Latency is from the moment at which a scan is due to its reception, by one clock.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import subprocess

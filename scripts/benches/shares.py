@@ -5,8 +5,6 @@ Linux's ``perf`` looks where the processor is, some thousand times; a picture an
 ``shares`` of the page show it by parts.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import re

@@ -6,8 +6,6 @@ on the machine hits both. The place ``sides`` of the page gets medians of proces
 ratios with their intervals.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import subprocess

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rows of ``mobilia bench`` about the SLAM: updates, memory, maps of ever more rooms."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import tempfile

@@ -4,8 +4,6 @@
 Figures are medians of ``REPEATS`` repeats of processor time.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace

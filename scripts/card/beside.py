@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Cards of real and simulated scanners side by side: made, as a table, as a picture."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import replace

@@ -5,8 +5,6 @@ TD is the manufacturer's technical description (8008970/06-2003), TL his telegra
 (8007954/2006-08-01), STW the ROS driver sicktoolbox_wrapper.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping
 from dataclasses import replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sensor card of any scanner with a data sheet: what is stated, and what is measured."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from fractions import Fraction

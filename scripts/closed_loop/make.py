@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Closed-loop drives as a whole: drive, write tables and pictures; what is there already stays."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is to be driven, and the job that one run is."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import asdict, dataclass, field
 from typing import Any

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The job that one driven run is, and its file."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, fields

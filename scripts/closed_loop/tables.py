@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From runs to ``goals.csv``, ``runs.csv`` and ``levels.csv``, and how a report reads them back."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run on file as what would make it again: for films and counterfactuals."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, fields
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One SLAM on one recorded run: what it believed, its memory, and the row that scores it."""
 
-from __future__ import annotations
-
 import ctypes
 import gc
 import json

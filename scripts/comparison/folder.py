@@ -9,8 +9,6 @@ run.believed("shunting").poses, run.truth, run.static_map
 What they must hold is said in ``schema``.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping, Sequence

@@ -10,8 +10,6 @@ new_object_recall  of what stands for 2 s at a new place, was seen in 5 scans an
                    that the map holds (half its hits within ``REACH_M`` of an occupied cell)
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass, field

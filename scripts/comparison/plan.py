@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is to be compared, and the jobs that it takes: one a run, and one for each SLAM on it."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass, field, replace
 from pathlib import Path

@@ -6,8 +6,6 @@ A rule is a word, a number, a list of such, a mapping: ``word``, ``number``, ``m
 shape checked before it is unpacked, then its values.
 """
 
-from __future__ import annotations
-
 import math
 import re
 from collections.abc import Callable, Iterable, Mapping

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The files of ``runs/``: one simulated run with all SLAMs, written and read by one schema."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -6,8 +6,6 @@ it, for ``report`` and ``verify`` alike. A table, a recipe or a run may hold mor
 array that is not named here is not read.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Tables of runs: what sums them up, and the CSV files that they are written to and read from."""
 
-from __future__ import annotations
-
 import csv
 import io
 import math

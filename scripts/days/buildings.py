@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many buildings, every SLAM in each: the jobs that it takes, and the rows that come of them."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """SLAMs over the sessions of a building: each session is localised in the map of those before."""
 
-from __future__ import annotations
-
 import json
 import tempfile
 import time

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changed between the sessions of a building, in words, pictures and scores."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

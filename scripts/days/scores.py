@@ -6,8 +6,6 @@ are to be found in its map. Early are the five sessions after it, late are the l
 each. At night doors are shut that the map of the evening holds open.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

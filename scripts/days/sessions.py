@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sessions of one building, from a dataset of ``mobilia generate --sessions`` or made here."""
 
-from __future__ import annotations
-
 import tempfile
 from collections.abc import Iterator, Sequence
 from dataclasses import asdict, dataclass, replace

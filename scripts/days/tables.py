@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What ``mobilia lifelong`` prints and writes: a table, lifelong.csv, lifelong.json."""
 
-from __future__ import annotations
-
 import json
 import re
 from collections.abc import Mapping, Sequence

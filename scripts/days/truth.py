@@ -7,8 +7,6 @@ stands. Recall asks for less: things of ``LEAST_M`` that stood still for most of
 met by beams, and whose place the other session saw.
 """
 
-from __future__ import annotations
-
 import math
 import shutil
 from collections.abc import Iterator, Sequence

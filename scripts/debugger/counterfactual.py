@@ -5,8 +5,6 @@ A change **cures** a divergence when by the end of the horizon (median over its 
 error than ``CURED`` of the original's has been gathered since the checkpoint.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Callable, Iterator

@@ -5,8 +5,6 @@ In ``blame.png`` everything stands where it truly is; the scan (red) is drawn wh
 believed it was seen from, so walls and red part company when the SLAM goes astray.
 """
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a counterfactual is asked: a divergence, how far before and after it, how often."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

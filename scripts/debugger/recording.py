@@ -7,8 +7,6 @@ same path, and the scanner and the encoders draw the same numbers, unless the ro
 something else than it did.
 """
 
-from __future__ import annotations
-
 import copy
 import json
 from collections.abc import Callable, Mapping, Sequence
@@ -159,7 +157,7 @@ class Strip:
         self.poses.append(poses)
         self.beams.append(beams)
 
-    def cut(self, first: int, last: int) -> Strip:
+    def cut(self, first: int, last: int) -> "Strip":
         """Rows ``first`` to ``last``."""
         rows = slice(first, last + 1)
         return Strip(

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The verdict in words, as a table and as JSON."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict
 from typing import Any

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One finding for each thing that mobilia needs or can use. Nothing is installed or changed."""
 
-from __future__ import annotations
-
 import os
 import platform
 import shutil

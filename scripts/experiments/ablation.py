@@ -6,8 +6,6 @@ levels and seeds), and the runs lost. The last column is the geometric mean over
 those on which the robot is carried off: there, drift is the way that it was carried.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 

@@ -8,8 +8,6 @@ sharp the map is by our final poses and by the log's, in nats below shuffled pos
 the two to believe. ``--every 2`` takes every second scan, ``--way backwards`` the log from its end.
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Sequence
 from dataclasses import replace

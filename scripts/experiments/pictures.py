@@ -7,8 +7,6 @@ of mover (docs/crowds.md). Without a name all are made. The gallery then links e
 clip that there is of it. No SLAM runs. Needs OpenGL.
 """
 
-from __future__ import annotations
-
 import argparse
 import re
 import sys

@@ -5,8 +5,6 @@ Measures public logs of SICK scanners and simulated scans by the same code, fill
 ``docs/real_scanner.md`` and draws its picture.
 """
 
-from __future__ import annotations
-
 import argparse
 import os
 import sys

@@ -6,8 +6,6 @@ study that was killed goes on when the same command is given again, and what oth
 settings made is made again.
 """
 
-from __future__ import annotations
-
 import argparse
 import hashlib
 import importlib

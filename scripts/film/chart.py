@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The pane of errors over time: position and heading, the 2 sigma claimed, and what happened."""
 
-from __future__ import annotations
-
 import math
 from array import array
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """H.264 films without a window: pictures are composed as arrays and piped to ffmpeg."""
 
-from __future__ import annotations
-
 import math
 import re
 import subprocess
@@ -18,6 +16,7 @@ from scripts.film import FPS
 from sim.view.draw import Picture
 from slam.errors import InvalidValueError, MissingDependencyError, OutputError
 from slam.files import reason, replacing
+from slam.shaped import within
 
 Size = tuple[int, int]
 
@@ -75,10 +74,8 @@ class Pace:
     preset: str = PRESET
 
     def __post_init__(self) -> None:
-        if not 1.0 <= self.fps <= 240.0:
-            raise InvalidValueError(f"fps must lie in 1..240, got {self.fps}")
-        if not 0.01 <= self.speed <= MOST_SPEED:
-            raise InvalidValueError(f"speed must lie in 0.01..{MOST_SPEED:g}, got {self.speed}")
+        within("fps", self.fps, 1.0, 240.0)
+        within("speed", self.speed, 0.01, MOST_SPEED)
         if not 0.0 <= self.from_s < self.to_s:
             raise InvalidValueError(
                 f"a film must go from 0 s or later to a later moment, got {self.from_s} to "
@@ -86,12 +83,12 @@ class Pace:
             )
 
     @classmethod
-    def within_a_minute(cls, duration_s: float, fps: float = FPS) -> Pace:
+    def within_a_minute(cls, duration_s: float, fps: float = FPS) -> "Pace":
         """Real time, faster where the film would last longer than ``FILM_S``."""
         return cls(fps=fps, speed=max(1.0, duration_s / FILM_S))
 
     @classmethod
-    def of_log(cls, duration_s: float, scans: int) -> Pace:
+    def of_log(cls, duration_s: float, scans: int) -> "Pace":
         """Real time up to a minute, no picture oftener than scans; longer logs in time-lapse.
 
         One picture for ``SCANS_A_PICTURE`` scans, at most ``MOST_PICTURES``: it costs less than
@@ -113,7 +110,7 @@ class Pace:
 
 
 @contextmanager
-def film(path: Path, fps: float, *, crf: int = CRF, preset: str = PRESET) -> Iterator[Film]:
+def film(path: Path, fps: float, *, crf: int = CRF, preset: str = PRESET) -> "Iterator[Film]":
     """A film that appears under ``path`` when the block ends well, and not at all otherwise.
 
     crf     H.264's constant rate factor: more is coarser and smaller

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be filmed: a run's folder, a dataset's episode, a log, or a simulation at hand."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -86,7 +84,7 @@ class Footage:
             size=size,
         )
 
-    def __enter__(self) -> Footage:
+    def __enter__(self) -> "Footage":
         return self
 
     def __exit__(self, *_: object) -> None:

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The panes of the map, of its last centimetres, and of a log's scan."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

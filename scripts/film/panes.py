@@ -4,8 +4,6 @@
 Your own stand in a column at the right of the map. Without any the film is what it was.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from typing import Any, TypeVar
@@ -98,7 +96,7 @@ class Layout:
     more: tuple[Box, ...] = ()
 
     @classmethod
-    def of(cls, size: Size, *, camera: bool, more: int = 0) -> Layout:
+    def of(cls, size: Size, *, camera: bool, more: int = 0) -> "Layout":
         """For a frame of (width, height) with ``more`` panes of users; all grow with it."""
         unit = min(size[0] / 1280.0, size[1] / 720.0)
         width, height = size[0] / unit, size[1] / unit

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Filming: every frame through every SLAM, pictures when they are due, strips of some."""
 
-from __future__ import annotations
-
 from collections import deque
 from collections.abc import Callable, Iterator, Sequence
 from pathlib import Path

@@ -7,8 +7,6 @@ for frame in replay.run(stream):
     picture = show.paint(frame)        # whenever one is wanted
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, replace
 
 import cv2
@@ -66,7 +64,7 @@ class Show:
     _seen_s: float = -SEEN_EVERY_S
     _scans: list[tuple[int, Scan]] = field(default_factory=list)  # that were seen, by frame
     _moved: int = 0
-    _panes: _Panes | None = None
+    _panes: "_Panes | None" = None
 
     @property
     def replay(self) -> Replay:

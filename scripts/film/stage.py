@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be shown of the true world: a room with its camera and events, of a log only scans."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator, Sequence
 
 from scripts.film.map_pane import RobotScan

@@ -4,8 +4,6 @@
 Room and scan lie in the world; map, estimates and paths in the map, which lies where the run began.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

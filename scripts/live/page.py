@@ -5,8 +5,6 @@ Callbacks run in threads of viser. They make requests, which are checked at birt
 over; they touch neither the world nor the playback.
 """
 
-from __future__ import annotations
-
 import html
 import importlib
 import math

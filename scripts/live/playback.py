@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a page may ask for, and play, pause, step and seek: which moment is shown."""
 
-from __future__ import annotations
-
 import math
 import queue
 import time

@@ -9,8 +9,6 @@ What is drawn is what the page of the live view draws (``scripts.live.drawn``), 
 moment by viser's own recorder; nothing is served.
 """
 
-from __future__ import annotations
-
 import asyncio
 import html
 import importlib
@@ -61,7 +59,7 @@ class Recorder:
     @contextmanager
     def writing(
         cls, path: Path, moments: Moments, world: World | None = None, *, title: str, seconds: float
-    ) -> Iterator[Recorder]:
+    ) -> "Iterator[Recorder]":
         """A page that appears under ``path`` when the block ends well."""
         recorder = cls(moments, world, title=title, seconds=seconds)
         with replacing(path) as temporary:
@@ -69,7 +67,7 @@ class Recorder:
             temporary.write_text(recorder.page(), encoding="utf-8")
 
     @classmethod
-    def of(cls, path: Path, show: Show) -> AbstractContextManager[Recorder]:
+    def of(cls, path: Path, show: Show) -> "AbstractContextManager[Recorder]":
         """Of what a film shows."""
         world, seconds = show.stage.world, show.duration_s
         return cls.writing(path, show.moments, world, title=show.title, seconds=seconds)

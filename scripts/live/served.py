@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """viser behind the gate: a page with a scene and its controls."""
 
-from __future__ import annotations
-
 import asyncio
 import contextlib
 import hmac

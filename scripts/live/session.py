@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run as it is shown live: what is served, scan by scan, and what has happened since."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from functools import partial
@@ -39,7 +37,7 @@ class Session:
     every    factor on the time between two looks at the map
     """
 
-    def __init__(self, footage: Footage, moments: Moments, hands: Hands | None = None) -> None:
+    def __init__(self, footage: Footage, moments: Moments, hands: "Hands | None" = None) -> None:
         self.footage, self.hands, self.moments = footage, hands, moments
         self.every = 1.0
         self._events_ns = 0
@@ -106,7 +104,7 @@ class Opener:
     settings: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
 
-    def anew(self, request: Anew) -> Opener:
+    def anew(self, request: Anew) -> "Opener":
         """The same with what a page has asked for."""
         slams = [request.slam or self.slams[0], *self.slams[1:]]
         asked = {k: getattr(request, k) for k in KNOBS if getattr(request, k) is not None}

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The loop of a live view: takes requests, makes moments at their pace and draws them."""
 
-from __future__ import annotations
-
 import time
 from collections.abc import Iterator, Sequence
 from typing import Any

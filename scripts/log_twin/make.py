@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A log's twin: building, way, scanner, odometry as wrong as its own; both in one picture."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field, replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run as the metrics see it: poses beside their truth, and what the SLAM said on the way."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -69,7 +67,9 @@ class Judged:
     duration_s: float = math.nan
 
     @classmethod
-    def of(cls, track: Track, truth: Trajectory | None, final: Trajectory | None = None) -> Judged:
+    def of(
+        cls, track: Track, truth: Trajectory | None, final: Trajectory | None = None
+    ) -> "Judged":
         """The online poses of a track."""
         return cls(
             estimate=track.online(),

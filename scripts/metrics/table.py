@@ -5,8 +5,6 @@
 ``reproduce`` and the experiments compute by it: a new metric is a new row.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

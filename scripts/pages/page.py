@@ -5,8 +5,6 @@ A page opens from disk and asks for nothing elsewhere. ``base.html`` is every pa
 and macros; the report of a comparison is another page of it.
 """
 
-from __future__ import annotations
-
 import base64
 import re
 import shlex

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which landmarks a map holds, against the true ones: missed, spurious, deleted by mistake."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Section 4.3: an arena in which all things are chairs that get pushed (Figs. 10-12, Table 3)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from scripts.figures import styled

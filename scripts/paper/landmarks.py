@@ -5,8 +5,6 @@ The paper shows one run and does not say how many of its points moved; its numbe
 ours at 25 %.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

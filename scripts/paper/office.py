@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Section 4.3, last paragraph: an ordinary office (Fig. 13)."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

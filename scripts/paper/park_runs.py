@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Section 4.1: one SLAM over Victoria Park, and the graph of known associations."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Any
 

@@ -6,8 +6,6 @@ error of poses, told by loops and by GPS; it deletes nothing. So landmarks are l
 place by place: those within ``NEAR_M`` of the laser, by a rigid fit of their own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Section 4.2: every SLAM on one world of points, and the floor of known associations."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from pathlib import Path
 from typing import Any

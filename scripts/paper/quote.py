@@ -7,8 +7,6 @@ has these marks gets what the experiment's ``summary.md`` says. The figures beco
 that was not run stays.
 """
 
-from __future__ import annotations
-
 import argparse
 import io
 import re

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an experiment leaves: figures as PNG and SVG, a Markdown table, the recipe."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field

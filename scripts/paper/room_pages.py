@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The runs, tables and figures that the experiments in rooms share."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise

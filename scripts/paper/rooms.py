@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Experiments in simulated rooms: one tour with the LMS-221, seen by every SLAM."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every experiment does: SLAMs over frames, results in one file, numbers over seeds."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 import math

@@ -4,8 +4,6 @@
 What it claims of single neurons is held by ``tests/slam/shunting/map``.
 """
 
-from __future__ import annotations
-
 import time
 from collections.abc import Sequence
 from dataclasses import dataclass, field

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Section 4.1: Victoria Park (Figs. 6 and 7, Table 1), against GPS and the known associations."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from typing import Any
 

@@ -5,8 +5,6 @@
 the room can be trusted, ``failed`` who raised, hung or gave no answer. All of them are pure.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Degradation curves: a number against the level, a line with its intervals for each SLAM."""
 
-from __future__ import annotations
-
 import io
 import math
 import re

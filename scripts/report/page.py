@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page: what each part of the template is given, and the one file that comes out."""
 
-from __future__ import annotations
-
 import math
 import shlex
 from collections.abc import Iterable, Mapping, Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pictures of single runs: maps beside the truth, error over time, a strip of moments."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores of age in tables and sentences, the same on a terminal, a report and a leaderboard."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison's tables, looked up by scene, level and SLAM, and what may be said of them."""
 
-from __future__ import annotations
-
 import os
 from collections import Counter
 from collections.abc import Container
@@ -18,7 +16,8 @@ from scripts.comparison.schema import LEVELS, PAIRED, RUNS
 from scripts.comparison.tables import Row
 from scripts.names import DATASET
 from scripts.output import RECIPE, read_recipe_words
-from slam.errors import InvalidValueError, LogFormatError, MissingPathError
+from slam.errors import LogFormatError, MissingPathError
+from slam.shaped import one_of
 
 LEAST_RUNS = 6  # with fewer not even all wins are unlikely enough by chance (sign test, 5 %)
 WORST = 3  # runs of a scene that the page lists
@@ -35,10 +34,8 @@ class Study:
     asked: str | None = None
 
     def __post_init__(self) -> None:
-        if self.asked is not None and self.asked not in self.slams:
-            raise InvalidValueError(
-                f"--subject must be one of {', '.join(self.slams)}, got {self.asked!r:.80}"
-            )
+        if self.asked is not None:
+            one_of("--subject", self.asked, self.slams)
 
     @cached_property
     def slams(self) -> list[str]:

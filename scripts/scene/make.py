@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scene from a map or from a log: three files, and what became of the map in words."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Iterator

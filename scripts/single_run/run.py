@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """SLAMs on a recorded log or on a simulated tour: what is understood of it, in which map."""
 
-from __future__ import annotations
-
 import hashlib
 import logging
 import math

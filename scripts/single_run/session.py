@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One run from a stream to a folder: replay, film, figures, map, trajectories, scores, recipe."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

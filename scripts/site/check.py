@@ -4,8 +4,6 @@
 No page may load anything from elsewhere. Broken links mkdocs finds itself (``validation``).
 """
 
-from __future__ import annotations
-
 import re
 import sys
 from collections.abc import Iterator

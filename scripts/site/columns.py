@@ -10,8 +10,6 @@ Ours name fields in columns, which is easy to read in code:
 Markdown would run these lines together, so they become a list.
 """
 
-from __future__ import annotations
-
 import re
 
 _NAME = r"[\w*.]+(?:/\w+)?(?:, [\w*.]+)*"

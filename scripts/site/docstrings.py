@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An extension of griffe: docstrings of this project as Markdown, for the API reference."""
 
-from __future__ import annotations
-
 from typing import Any
 
 from griffe import Extension, Object

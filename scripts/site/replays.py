@@ -4,8 +4,6 @@
 ``scene_NAME.html`` and ``track_NAME.html`` as the gallery names its clips; what is there stays.
 """
 
-from __future__ import annotations
-
 import argparse
 from pathlib import Path
 from typing import Any

@@ -1,11 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia bench``: speed figures of this machine, as a table and as JSON."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable, Iterable
-from functools import partial
 from pathlib import Path
 from typing import Annotated, Any
 
@@ -39,7 +36,7 @@ def bench(
     """
     if not 1.0 <= seconds <= 3600.0:
         raise InvalidValueError(f"--seconds must lie in [1, 3600] s, got {seconds}")
-    from scripts.benches import crowds, dataset, world
+    from scripts.benches import episodes, world
     from scripts.benches import slam as bench_slam
     from scripts.machine import machine
 
@@ -50,12 +47,12 @@ def bench(
         world.scanner,
         world.physics,
         world.environments,
-        crowds.rows,
+        episodes.crowds,
         world.pictures,
         bench_slam.updates,
         bench_slam.ekf,
         bench_slam.area,
-        partial(dataset.rows, seed=world.SEED, dynamism=world.DYNAMISM),
+        episodes.office,
     )
 
     if against:

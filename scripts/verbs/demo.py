@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia demo``: a minute of a moving office, the shunting SLAM against odometry."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

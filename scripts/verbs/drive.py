@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia drive``: a robot steered by its SLAM's estimate, goal by goal, in rooms that move."""
 
-from __future__ import annotations
-
 import time
 from dataclasses import asdict
 from pathlib import Path
@@ -59,7 +57,7 @@ def drive(
     from scripts.closed_loop.make import carry_out, said, success_table
     from scripts.closed_loop.plan import RUNS, Plan
     from scripts.pages.page import Page, Part, command, publish
-    from sim.loop.config import LoopConfig
+    from sim.loop import LoopConfig
 
     workers.check_jobs(jobs)
     axis, at, held = options.axis_levels(dynamism, motion, change)

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia list``: which scenes, scanners and SLAMs there are."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Sequence
 
 from rich.markup import escape

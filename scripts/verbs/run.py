@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia run``: SLAMs on a recorded log or a simulated tour, scored, mapped and filmed."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia scene``: make a scene of a map or a log, show it, check it."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia sensor-card``: a simulated scanner beside its data sheet, or beside a real log."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import Annotated
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia twin``: a log driven again in simulation, in its own building."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Annotated

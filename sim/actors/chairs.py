@@ -13,8 +13,6 @@ freedoms are joints in a row: x, y, yaw as at the planar level, so that these st
 addresses of a chair for everyone who pushes, avoids or draws it, then height, pitch and roll.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import replace
@@ -31,7 +29,6 @@ from sim.actors.rolling import Rolling, inertia_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds, between, waiting
 from slam._jit import uncounted
-from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 _TICKS_MIN, _TICKS_MAX = ACTORS.chairs.push_least_ticks, ACTORS.chairs.push_most_ticks
@@ -182,13 +179,6 @@ def stand_on_castors(scene: Scene) -> Scene:
         if feet is not None:
             _set_on_feet(spec, mover.name, feet)
     return replace(scene, spec=spec)
-
-
-def checked_level(level: str) -> str:
-    """One of ``LEVELS``."""
-    if level not in LEVELS:
-        raise InvalidValueError(f"chairs must be one of {', '.join(LEVELS)}, got {level!r}")
-    return level
 
 
 def _set_on_feet(spec: mujoco.MjSpec, name: str, feet: Feet) -> None:

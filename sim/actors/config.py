@@ -5,8 +5,6 @@
 kernels of the world: so they are fixed, and the same in every run.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 from typing import Any
 

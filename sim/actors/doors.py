@@ -10,8 +10,6 @@ for the robot adds a torque through ``qfrc_applied``; at all other times that is
 door at rest sleeps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple

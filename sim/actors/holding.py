@@ -6,8 +6,6 @@ stopped by it. The torque of two hands is taken up by the feet. Forces are gener
 planar joints (x, y, yaw), written before each substep.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

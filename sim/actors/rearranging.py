@@ -10,8 +10,6 @@ What is drawn is a function of the thing and of the moment alone. So nobody else
 where one thing is absent, and nothing but a few marks has to be saved.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any

@@ -7,8 +7,6 @@ true path when the robot pushes something or slips, as on a real floor. Encoder 
 business of ``sim.sensors.odometry.encoders``.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -8,8 +8,6 @@ seed, the share and the number of chairs, not on what a chair meets: one that is
 heading by the golden angle, without a draw, until it gets away.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import NamedTuple
@@ -22,7 +20,7 @@ from sim.actors.config import ACTORS
 from sim.core.seeds import between, uniform
 from sim.core.state import Records, flat, record
 from slam._jit import inner
-from slam.errors import InvalidValueError
+from slam.shaped import within
 
 Float = NDArray[np.float64]
 
@@ -106,8 +104,7 @@ class Rolling:
         share: float,
         counters: NDArray[np.uint64],
     ) -> None:
-        if not 0.0 <= share <= 1.0:
-            raise InvalidValueError(f"moving_share must lie in [0, 1], got {share}")
+        within("moving_share", share, 0.0, 1.0)
         self.names = tuple(names)
         n = len(self.names)
         self.counters = counters[:n].copy()

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Arguments of the wrong type are refused where they are given, by name, not where they hurt."""
 
-from __future__ import annotations
-
 from typing import Annotated, Any
 
 import numpy as np

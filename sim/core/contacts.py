@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the robot touches, and how hard."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import NamedTuple
 

@@ -24,8 +24,6 @@ For experiments that ask "how many may move?", ``moving_share`` replaces the sho
 loads by a set share of them on the move at any time (``sim.actors.rolling``).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
@@ -106,7 +104,7 @@ class Dynamism:
                 )
 
     @classmethod
-    def at(cls, dynamism: float, *, change: float | None = None) -> Dynamism:
+    def at(cls, dynamism: float, *, change: float | None = None) -> "Dynamism":
         """Both axes at a dynamism in [0, 1], or motion at it and ``change`` apart.
 
         Raises ``InvalidValueError`` outside.
@@ -116,19 +114,19 @@ class Dynamism:
         return cls(**{rate.field: rate.at(d) for rate in CURVES}, change=both)
 
     @classmethod
-    def world_1(cls, dynamism: float) -> Dynamism:
+    def world_1(cls, dynamism: float) -> "Dynamism":
         """What a dynamism was in world 1: the rates without a crowd or change."""
         return replace(cls.at(dynamism, change=0.0), crowd=0.0)
 
     @classmethod
     def of(
         cls,
-        dynamism: float | Dynamism,
+        dynamism: "float | Dynamism",
         moving_share: float | None = None,
         *,
         motion: float | None = None,
         change: float | None = None,
-    ) -> Dynamism:
+    ) -> "Dynamism":
         """A number in [0, 1] for both axes, or the rates; then what is given for one axis alone.
 
         moving_share  as the field of that name

@@ -9,8 +9,6 @@ An error of MuJoCo inside compiled code ends the process with its message: there
 it to raise in. What a run can meet (divergence, too many contacts) is a warning, as ever.
 """
 
-from __future__ import annotations
-
 import ctypes
 from typing import Any, NamedTuple
 

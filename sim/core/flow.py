@@ -9,8 +9,6 @@ plainer
 sibling: a walker needs a smooth direction anywhere, a planner whether a cell may be entered.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

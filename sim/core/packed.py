@@ -6,8 +6,6 @@ compiling. ``packed`` writes it into one block of words once, tables in it into 
 In kernels ``table.name`` is then what it is in Python.
 """
 
-from __future__ import annotations
-
 import hashlib
 from pathlib import Path
 from typing import Any

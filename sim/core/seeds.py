@@ -5,8 +5,6 @@ Adding a person must not move the chairs, and a noisier scanner must not change 
 part asks for a stream by name; ``Seeds(3, lidar=7)`` is run 3 with the scanner noise of run 7.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 

@@ -5,8 +5,6 @@ Only upright static boxes at the scanner's height hide anything (walls, cabinets
 nor a table's legs, nor anything that moves. So what is said to be hidden truly is.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any, NamedTuple
@@ -58,7 +56,7 @@ class Eye:
     reach: float
 
     @classmethod
-    def of(cls, spec: LaserSpec) -> Eye:
+    def of(cls, spec: LaserSpec) -> "Eye":
         """The eye of a scanner."""
         half = min(0.5 * (spec.n_beams - 1) * abs(spec.angle_increment), math.pi)
         middle = spec.angle_min + 0.5 * (spec.n_beams - 1) * spec.angle_increment

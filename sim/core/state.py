@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Named arrays and a few words as one block of bytes, and back. No pickle: loading runs no code."""
 
-from __future__ import annotations
-
 import json
 import math
 from collections.abc import Mapping

@@ -10,8 +10,6 @@ To change the world: raise ``WORLD``, say in ``CHANGES`` what became of the old 
 ``tests/sim/core/test_versions.py`` the new digest.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from pathlib import Path
 from typing import Any, NoReturn

@@ -5,8 +5,6 @@
 around it. Recorded episodes give it the truth, a closed loop gives it a SLAM's estimate.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

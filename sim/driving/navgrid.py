@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a disc can drive in a static layout, and how far it is from there to a goal."""
 
-from __future__ import annotations
-
 import heapq
 import math
 
@@ -46,7 +44,7 @@ class NavGrid:
         _approach(self.clearance, _boxes(obstacles), self.x0, self.y0, cell)
         self._costs: dict[tuple[float, float], Float] = {}
 
-    def with_boxes(self, boxes: Float) -> NavGrid:
+    def with_boxes(self, boxes: Float) -> "NavGrid":
         """The same floor with more obstacles on it, (k, 5)."""
         other = object.__new__(NavGrid)
         other.cell, other.radius, other.x0, other.y0 = self.cell, self.radius, self.x0, self.y0

@@ -5,8 +5,6 @@ Reactive avoidance on truth is what recording needs: the path must not depend on
 loop steers ``sim.driving.drive.Driver`` with an estimate instead.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The moving rooms as a Gymnasium environment."""
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 
@@ -12,7 +10,7 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from scenes import SCAN_HEIGHT
-from sim.core.checks import number, one_of, switch, whole
+from sim.core.checks import one_of, switch, whole
 from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
@@ -24,8 +22,9 @@ from sim.sensors.lidar.device import ScanResult
 from sim.sensors.lidar.registry import ScannerConfig
 from sim.simulation import Simulation
 from sim.world.world import World
-from slam.errors import InvalidValueError, MobiliaError
+from slam.errors import MobiliaError
 from slam.frames import LaserSpec
+from slam.shaped import Positive, shaped
 from slam.system import SlamSystem
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
@@ -170,9 +169,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             scene=scene, dynamism=dynamism, motion=motion, change=change, crowd=crowd, laser=laser,
             scan_height_m=scan_height_m, odometry=odometry, labels=labels,
         )  # fmt: skip
-        number("time_limit_s", time_limit_s)
-        if not time_limit_s > 0.0:
-            raise InvalidValueError(f"time_limit_s must be > 0, got {time_limit_s}")
+        shaped("time_limit_s", time_limit_s, Positive)
         switch("terminate_on_collision", terminate_on_collision)
         one_of("reward", reward, REWARDS)
         whole("frame_skip", frame_skip, 1, MOST_SCANS)

@@ -4,8 +4,6 @@
 There are three rewards for a robot that is to reach a goal. All go by the truth.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Any
@@ -117,7 +115,7 @@ class Ground:
             rows.append((x, y, half, half, 0.0))
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
-    def way(self, goal: Goal) -> Way:
+    def way(self, goal: Goal) -> "Way":
         """To measure what is left to ``goal``."""
         return Way(self._layout, goal)
 

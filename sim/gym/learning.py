@@ -5,8 +5,6 @@ rooms = learning_rooms("mobilia/ArenaGoal-v2", 8)
 PPO("MlpPolicy", rooms).learn(150_000)
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from typing import Any
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an environment tells a policy, and shows: its space, finite ranges, two pictures."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

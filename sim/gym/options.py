@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an environment takes, checked by name: arguments, the options of a reset, actions."""
 
-from __future__ import annotations
-
 import difflib
 import math
 from collections.abc import Mapping

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where an environment's robot believes it is: by a SLAM, by its wheels, or by the truth."""
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

@@ -9,8 +9,6 @@ side by side; physics, crowd and scanner let go of the interpreter lock, and the
 depend on it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import ThreadPoolExecutor, wait

@@ -5,8 +5,6 @@ Whatever has no need of this project is Gymnasium's: ``gymnasium.wrappers.FrameS
 stacks what these give.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import Any
 
@@ -18,10 +16,11 @@ from gymnasium.wrappers import TransformObservation
 from gymnasium.wrappers.vector import TransformObservation as OfMany
 from numpy.typing import NDArray
 
-from sim.core.checks import number, whole
+from sim.core.checks import whole
 from sim.core.dynamism import Dynamism
 from sim.gym.observation import Observation
 from slam.errors import InvalidValueError
+from slam.shaped import Positive, shaped
 
 SECTORS = 36  # of 361 beams: 5 degrees each
 NEAR_M = 4.0  # m, what is farther looks like this far
@@ -69,9 +68,7 @@ def GoalVector(env: Any, near_m: float = NEAR_M) -> Any:
     Each range over ``near_m``, at most 1; range of the goal over 8 m, at most 1; cosine and sine
     of its bearing. Raises ``InvalidValueError`` for an environment without ``goal_polar``.
     """
-    number("near_m", near_m)
-    if not near_m > 0.0:
-        raise InvalidValueError(f"near_m must be > 0, got {near_m}")
+    shaped("near_m", near_m, Positive)
     n = _entry(_space(env), "ranges", "GoalVector").shape[0]
     _entry(_space(env), "goal_polar", "GoalVector")
 

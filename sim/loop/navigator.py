@@ -6,8 +6,6 @@ the same two that drive recorded episodes, there by truth. The grid is the scene
 the map that the SLAM has so far, in the world frame, reached through the known start.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass
@@ -17,10 +15,10 @@ import numpy as np
 from scenes.scene import Scene
 from sim.driving.drive import LOOK_AHEAD_M, Driver, TourConfig
 from sim.driving.navgrid import NavGrid
-from sim.loop.config import LoopConfig
 from sim.loop.sight import Sight
 from slam import se2
 from slam.frames import NS_PER_S, Float, Frame
+from slam.settings import Settings, number, word
 from slam.system import Estimate, Raster
 
 MARGIN_M = 1.0  # of floor round what is known
@@ -29,6 +27,29 @@ OCCUPIED = 0.5  # cells of a map above this are walls
 # the floor free.
 SLACK_M = 0.15
 _KEPT_BACK_M = 0.05  # planned ways come this much nearer to walls than the driver does
+
+
+@dataclass(frozen=True, kw_only=True)
+class LoopConfig(Settings):
+    """What counts as what, and how often things are done.
+
+    Ways are planned on the scene's static ``layout``, or on the SLAM's ``map``.
+    """
+
+    plan_on: str = word("layout", ("layout", "map"), "what ways are planned on")
+    scans: int = number(4, "scans", "to one update and one command: 9.4 Hz", low=1, high=100)
+    arrive_m: float = number(0.1, "m", "so near it believes to have arrived", low=1e-6, high=10.0)
+    tolerance_m: float = number(0.5, "m", "so near it truly has", low=1e-6, high=10.0)
+    patience_s: float = number(
+        20.0, "s", "without believed progress: a goal is given up", low=1e-6, high=1e4
+    )
+    limit_s: float = number(90.0, "s", "after which it is in any case", low=1e-6, high=1e4)
+    replan_s: float = number(
+        1.0, "s", "between two plans, round what is seen standing in the way", low=1e-6, high=1e4
+    )
+    near_m: float = number(
+        0.15, "m", "between rims of a person and the robot: a near miss", low=1e-6, high=10.0
+    )
 
 
 class LayoutPlanner:

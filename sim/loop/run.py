@@ -5,8 +5,6 @@
 nothing.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, field, replace
@@ -15,8 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.core.contacts import Contact
-from sim.loop.config import LoopConfig
-from sim.loop.navigator import Decision, Navigator
+from sim.loop.navigator import Decision, LoopConfig, Navigator
 from sim.simulation import Simulation
 from sim.world.world import World
 from slam import se2

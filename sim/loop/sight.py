@@ -7,8 +7,6 @@ spring of 6 cm and a person two shins: a thing so thin is taken for something wi
 something wide was lately seen in its place, as where it is the end of a wall or of a door's leaf.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames into a rosbag2 with MCAP storage, written by the rosbags library, without ROS."""
 
-from __future__ import annotations
-
 import hashlib
 import struct
 import sys
@@ -143,7 +141,7 @@ class BagWriter:
         self._hash = MessageHash()
         self._started = False
 
-    def __enter__(self) -> BagWriter:
+    def __enter__(self) -> "BagWriter":
         self._writer.open()
         made: dict[str, object] = {
             "/ground_truth/objects": self._objects,

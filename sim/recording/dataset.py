@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A folder of episodes and the plan that they follow."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One episode from its recipe: simulated, written, and put in its place when it is whole."""
 
-from __future__ import annotations
-
 import math
 import os
 import shutil

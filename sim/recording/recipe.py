@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The recipe of an episode: about 1 KB from which the same bytes can be made again."""
 
-from __future__ import annotations
-
 import hashlib
 import inspect
 import json
@@ -20,7 +18,7 @@ import numpy as np
 
 from scenes.crowd import crowd_of
 from scenes.scene_file import sha256_of
-from sim.core.checks import number, one_of
+from sim.core.checks import number, one_of, within
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
@@ -131,26 +129,19 @@ class Recipe:
 
     def _check_change(self) -> None:
         if self.change is not None:
-            number("Recipe.change", self.change)
-            if not 0.0 <= self.change <= 1.0:
-                raise InvalidValueError(f"Recipe.change must lie in [0, 1], got {self.change}")
+            within("Recipe.change", self.change, 0.0, 1.0)
         checked_moment(self.change_at_s, self.session)
         if self.kidnap_every_s is not None:
             Kidnapping(self.kidnap_every_s, Seeds(self.seed))
-            if self.twin:
-                raise InvalidValueError(
-                    f"Recipe.kidnap_every_s and twin exclude each other: {self.twin}"
-                )
         if self.robot is not None:
             robot_of(self.robot)
         if self.events is not None:
             cues_of(self.events)
-            if self.twin:
-                raise InvalidValueError(f"Recipe.events and twin exclude each other: {self.twin}")
         if self.session is not None:
             checked(self.session)
-            if self.twin:
-                raise InvalidValueError(f"Recipe.session and twin exclude each other: {self.twin}")
+        for name in ("kidnap_every_s", "events", "session") if self.twin else ():
+            if getattr(self, name) is not None:
+                raise InvalidValueError(f"Recipe.{name} and twin exclude each other: {self.twin}")
 
     @property
     def share_changed(self) -> float:
@@ -184,7 +175,7 @@ class Recipe:
             **self.options,
         }
 
-    def of_twin(self, twin: str) -> Recipe:
+    def of_twin(self, twin: str) -> "Recipe":
         """The same for another version of its drive."""
         return replace(self, twin=twin)
 

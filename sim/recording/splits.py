@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Training, validation and test parts of a dataset: no seed is in two of them."""
 
-from __future__ import annotations
-
 import re
 from collections.abc import Sequence
 

@@ -6,8 +6,6 @@ one line more a missing file; it is read strictly, so that blanks, case and orde
 file that is made alone has its hash beside it instead, as ``<name>.sha256``.
 """
 
-from __future__ import annotations
-
 import hashlib
 import os
 import re

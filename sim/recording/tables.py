@@ -12,8 +12,6 @@ thing: stayed, moved, gone or new. Both are as of the start of the session, in t
 and of ``/ground_truth/objects``; a door stands at its hinge and heads along its leaf.
 """
 
-from __future__ import annotations
-
 import csv
 import io
 import math

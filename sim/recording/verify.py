@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Is an episode what it was? By its hashes, and by making it again."""
 
-from __future__ import annotations
-
 import os
 import tempfile
 from collections.abc import Mapping, Sequence

@@ -15,8 +15,6 @@ way round. Nobody else draws other numbers: every actor has a generator of its o
 do may differ all the same, because they meet, or no longer meet, what was changed.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

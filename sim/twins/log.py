@@ -6,8 +6,6 @@ its normal, and with many beams the wall turns a little. Then each scan moves to
 are, as the poses of a log err by centimetres, too; and so on in turn.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
@@ -59,7 +57,7 @@ def laid(boxes: Float, lasers: Float, ranges: Float, angles: Float) -> tuple[Flo
     return np.round(out, 4), np.round(poses, 6)
 
 
-def _put_right(poses: Float, seen: Seen) -> None:
+def _put_right(poses: Float, seen: "Seen") -> None:
     """Move each pose to where its returns lie on the faces: one step of least squares, bounded."""
     near = np.abs(seen.inward) < POSE_NEAR_M
     for k in range(len(poses)):

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A room at rest through which a robot is carried along a recorded drive (``sim.twins.twins``)."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass

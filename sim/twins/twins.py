@@ -16,8 +16,6 @@ nothing is put where the path crosses later. Slip is off: odometry follows from 
 the same to the bit in all three, as are the numbers drawn for the beams' noise.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

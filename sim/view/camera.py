@@ -9,8 +9,6 @@ so that it works whatever ``MUJOCO_GL`` was when mujoco was imported. A camera b
 that made it. People between a camera that rides on the robot and the robot are drawn as glass.
 """
 
-from __future__ import annotations
-
 import importlib
 from typing import Any, Self
 
@@ -19,9 +17,10 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.core.checks import number, numbers
+from sim.core.checks import number, numbers, whole
 from sim.view import gl
 from slam.errors import InvalidValueError, MissingDependencyError
+from slam.shaped import Positive, shaped
 
 PAINT_GROUP = 5  # shadows painted under things
 HIDDEN_GROUPS = (3, 4)  # collision hulls, marks
@@ -61,8 +60,7 @@ class Camera:
         samples: int = 0,
     ) -> None:
         for field, value in (("width", width), ("height", height)):
-            if not 1 <= value <= MAX_SIZE:
-                raise InvalidValueError(f"{field} must lie in 1..{MAX_SIZE} px, got {value}")
+            whole(field, value, 1, MAX_SIZE)
         found = gl.find()
         if found.backend is None:
             raise MissingDependencyError(f"no 3-D pictures: {found.reason}")
@@ -122,12 +120,9 @@ class Camera:
             raise InvalidValueError("this Camera is closed")
         for field, value in zip(("x", "y"), numbers("at", at, 2, "(x m, y m)"), strict=True):
             number(f"at: {field}", value)
-        for field, value in (
-            ("far_m", far_m), ("azimuth_deg", azimuth_deg), ("down_deg", down_deg)
-        ):  # fmt: skip
+        shaped("far_m", far_m, Positive)
+        for field, value in (("azimuth_deg", azimuth_deg), ("down_deg", down_deg)):
             number(field, value)
-        if not far_m > 0.0:
-            raise InvalidValueError(f"far_m must be > 0, got {far_m}")
         self._view.type = mujoco.mjtCamera.mjCAMERA_FREE
         self._view.lookat[:] = (*at, LOOK_AT_M)
         self._view.distance, self._view.azimuth = far_m, azimuth_deg

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small drawing helpers on RGB uint8 images, for all pictures: colours, text, lines, scale bars."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -51,7 +49,7 @@ class View:
     height: int
 
     @classmethod
-    def fitting(cls, bounds: tuple[float, float, float, float], width: int, height: int) -> View:
+    def fitting(cls, bounds: tuple[float, float, float, float], width: int, height: int) -> "View":
         """The largest scale at which ``bounds`` (xmin, ymin, xmax, ymax) fit, centred."""
         xmin, ymin, xmax, ymax = bounds
         scale = min(width / (xmax - xmin), height / (ymax - ymin))

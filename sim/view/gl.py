@@ -7,8 +7,6 @@ each library is tried in a subprocess that draws 8 x 8 pixels, and this module d
 mujoco. ``sim.view.camera`` makes its context from the answer, whatever MuJoCo picked for itself.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -8,8 +8,6 @@ What a thing looks like from above its model says (``sim.view.parts``): outlines
 the lowest to the highest. What stays is painted once, paler than what moves.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

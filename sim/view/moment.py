@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One moment of a run as it is shown, whatever draws it: the room, the scan, what SLAMs say."""
 
-from __future__ import annotations
-
 import math
 from array import array
 from collections.abc import Mapping, Sequence

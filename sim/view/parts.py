@@ -5,8 +5,6 @@ What a thing looks like is said once, by the geoms of its model: whoever draws a
 means than MuJoCo's renderer (``sim.view.camera``), in 3-D or from above, draws these.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -37,7 +35,7 @@ class Placed:
     mocap_quat: Float
 
     @classmethod
-    def of(cls, world: World) -> Placed:
+    def of(cls, world: World) -> "Placed":
         """Now."""
         data = world.data
         mocap = data.mocap_pos.copy(), data.mocap_quat.copy()

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scan as all pictures draw it: where beams ended, coloured by what they hit."""
 
-from __future__ import annotations
-
 import numpy as np
 from numpy.typing import NDArray
 

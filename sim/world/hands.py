@@ -5,8 +5,6 @@ Call these between two scans. They draw nothing, so the same call at the same sc
 world, and a world that nobody touches goes on as if they were not there.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

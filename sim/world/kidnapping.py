@@ -5,21 +5,18 @@ It is put to where it stood earlier on its tour, at the same heading, so what it
 mapped. It stands still at first, and its wheels have not rolled on the way.
 """
 
-from __future__ import annotations
-
-import math
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from scenes.assembly import hulls, moved
 from scenes.kinds import kind_of
-from sim.core.checks import number
 from sim.core.seeds import Seeds
 from sim.world.world import World
-from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S
+from slam.shaped import MOST, shaped
 
 Float = NDArray[np.float64]
 FAR_M = 3.0  # m from where it is taken to where it is put, at least
@@ -39,11 +36,7 @@ class Kidnapping:
     """
 
     def __init__(self, every_s: float, seeds: Seeds) -> None:
-        number("kidnap_every_s", every_s)
-        if not LEAST_S <= every_s < math.inf:
-            raise InvalidValueError(
-                f"kidnap_every_s must be >= {LEAST_S:g} and finite, got {every_s}"
-            )
+        shaped("kidnap_every_s", every_s, Annotated[float, Meta(ge=LEAST_S, le=MOST)])
         self._every_ns, self._seed = round(every_s * NS_PER_S), seeds.integer("driving")
         self._noted_ns, self._done = 0, 0
         self._visited: list[Float] = []

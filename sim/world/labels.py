@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Truth per beam, from the ids of what the scanner hit: for scoring, never for a SLAM."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene that a world begins with: built, and with a crowd in it."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What somebody may ask of a world, bounded and checked, and how it is done between two scans."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Annotated

@@ -4,8 +4,6 @@
 A robot is a name of ``sim/robots`` or the tables of such a file (``docs/robots.md``).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, replace

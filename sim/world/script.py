@@ -11,8 +11,6 @@ Each event has ``at_s`` and one of ``push``, ``open``, ``shut``, ``enter`` and `
 people enter, as soon as the place is free.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ can be made without those before it. What that simplifies: whatever is pushed ab
 is put back before the next arrangement, and within a session nothing changes out of sight.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -23,7 +21,7 @@ from scenes.arrangement import MARGIN_M, Places, fits, places_of
 from scenes.builder import LATCH
 from scenes.scene import Mover, Pose, Scene
 from sim.actors.rearranging import ELSEWHERE_M, FAR_M, find_place, is_movable, place_out
-from sim.core.checks import instance
+from sim.core.checks import instance, within
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import STREAMS, Seeds
 from sim.core.sight import nobody
@@ -36,7 +34,6 @@ from sim.world.times_of_day import (
     checked,
     time_of,
 )
-from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 TURNED_RAD = 0.3  # rad, a door turned by less stands as it stood
@@ -67,9 +64,7 @@ class Days:
     """
 
     def __init__(self, scene: Scene, seeds: Seeds, change: float) -> None:
-        if isinstance(change, bool) or not 0.0 <= change <= 1.0:
-            raise InvalidValueError(f"change must lie in [0, 1], got {change!r}")
-        self.scene, self.share = scene, float(change)
+        self.scene, self.share = scene, within("change", change, 0.0, 1.0)
         self._seed = seeds.integer("change")
         self._places: Places = places_of(scene)
         self._things = [m for m in scene.movers if is_movable(m)]

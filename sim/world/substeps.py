@@ -7,8 +7,6 @@ are made fresh, so that whoever looks between two substeps (a scanner, a film, `
 poses of that very instant, and forces that will act from it on.
 """
 
-from __future__ import annotations
-
 from typing import Any, NamedTuple
 
 import numpy as np

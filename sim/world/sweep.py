@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The time of one scan: physics steps, where the robot was at each, when its beams are."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from fractions import Fraction
 from typing import Any
@@ -32,7 +30,7 @@ class ScanTiming:
     sweep_s: float
 
     @classmethod
-    def of(cls, laser: LaserScanner) -> ScanTiming:
+    def of(cls, laser: LaserScanner) -> "ScanTiming":
         """Of the scan that was begun last."""
         offset_ns = laser.scanner.stamp_offset_ns
         first = laser.window.first + offset_ns * 1e-9 * STEPS_PER_S

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is usual at which time of day: the habits of a building (``sim.world.sessions``)."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any

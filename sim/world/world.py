@@ -5,8 +5,6 @@ What a substep is, is in ``sim.world.substeps``. Whoever moves things by hand (`
 between two of them calls ``mj_forward`` then.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -15,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.scene import Scene
-from sim.actors.chairs import Shoves, checked_level, pushers, stand_on_castors, tables
+from sim.actors.chairs import LEVELS, Shoves, pushers, stand_on_castors, tables
 from sim.actors.doors import Doors
 from sim.actors.people.people import People
 from sim.actors.rearranging import Rearrangement, Rearranging
@@ -23,7 +21,7 @@ from sim.actors.robot import Drive, DriveConfig
 from sim.actors.rolling import Rolling
 from sim.core import state
 from sim.core.bodies import Bodies
-from sim.core.checks import instance, number
+from sim.core.checks import instance, one_of, within
 from sim.core.contacts import Contact, RobotContacts
 from sim.core.dynamism import Dynamism
 from sim.core.engine import engine
@@ -101,7 +99,9 @@ class World:
         self.robot = None if robot is None else robot_of(robot)
         if self.robot is not None:
             built, drive = with_robot(built, self.robot), drive or self.robot.drive
-        self.scene = stand_on_castors(built) if checked_level(chairs) == "free" else built
+        self.scene = (
+            stand_on_castors(built) if one_of("chairs", chairs, LEVELS) == "free" else built
+        )
         self.model: mujoco.MjModel = self.scene.compile()
         self.data = mujoco.MjData(self.model)
         self.mover_names = tuple(m.name for m in self.scene.movers)
@@ -169,9 +169,7 @@ class World:
         return packed(room)
 
     def _rearranger(self, change: float) -> Rearranging | None:
-        number("change", change)
-        if not 0.0 <= change <= 1.0:
-            raise InvalidValueError(f"change must lie in [0, 1], got {change!r}")
+        within("change", change, 0.0, 1.0)
         if change == 0.0 or self.bodies.robot is None:
             return None
         counters = self._counters("change")

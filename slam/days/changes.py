@@ -7,8 +7,6 @@ nearby are taken for the same thing, moved. Two thin ones that share an end are 
 after.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ It needs scans and poses only, so it works beside any SLAM. A return counts for 
 lies in; the places that the beams passed count as empty.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -15,8 +15,6 @@ sighting from those before it. How well it does is its weight at that place, and
 is in the building is learnt along with it (expectation maximisation).
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from functools import cached_property
@@ -305,7 +303,7 @@ class DaysRaster(Raster):
     mobility: MobilityMap
 
     @classmethod
-    def of(cls, raster: Raster, mobility: MobilityMap) -> DaysRaster:
+    def of(cls, raster: Raster, mobility: MobilityMap) -> "DaysRaster":
         """``raster`` with that beside it."""
         return cls(
             values=raster.values,

@@ -6,8 +6,6 @@ through a place where something stood then. Each place is news for ``NEWS_S``. T
 learnt it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
@@ -50,7 +48,7 @@ class History:
     def __len__(self) -> int:
         return len(self.sessions)
 
-    def with_session(self, snapshot: Snapshot, most: int = SESSIONS) -> History:
+    def with_session(self, snapshot: Snapshot, most: int = SESSIONS) -> "History":
         """One more; of more than ``most`` the oldest go.
 
         Raises ``InvalidValueError`` for one that is not later than the last: the same session
@@ -94,7 +92,7 @@ class History:
         }
 
     @classmethod
-    def of_arrays(cls, path: Path, arrays: Mapping[str, NDArray[Any]]) -> History:
+    def of_arrays(cls, path: Path, arrays: Mapping[str, NDArray[Any]]) -> "History":
         """Of a file's arrays; ``LogFormatError`` for what ``arrays`` never gives."""
         cell, times = arrays["day_cell_m"], arrays["day_times_s"]
         cells, levels = arrays["day_cells"], arrays["day_standing"]

@@ -12,8 +12,6 @@ those where it found something and the sessions before had a say, the share that
 Chairs and doors make few of both, a wrong place makes many.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace

@@ -7,8 +7,6 @@ for frame in frames:
 keep(session, Path("m.npz"))
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from pathlib import Path
@@ -85,7 +83,7 @@ class Session:
         self.reset()
 
     @classmethod
-    def open(cls, path: Path, kind: type[Tracker], *, time_s: float) -> Session:
+    def open(cls, path: Path, kind: type[Tracker], *, time_s: float) -> "Session":
         """A session in the map of a file, its start unknown; ``LogFormatError`` as ``load``.
 
         A map of before days, or one that a single run saved, has no history: it begins here.

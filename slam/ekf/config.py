@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be set of the EKF, and its presets for corners and for Victoria Park."""
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any, ClassVar
@@ -79,12 +77,12 @@ class EkfConfig(Settings):
         )
 
     @classmethod
-    def points(cls, **changes: Any) -> EkfConfig:
+    def points(cls, **changes: Any) -> "EkfConfig":
         """Point features as a sensor gives them: the defaults."""
         return cls(**changes)
 
     @classmethod
-    def corners(cls, **changes: Any) -> EkfConfig:
+    def corners(cls, **changes: Any) -> "EkfConfig":
         """Corners of indoor scans: near, some round, some false; what moves does so slowly.
 
         A false pair costs more here than a true one that is left out: hence the narrow gates, and
@@ -103,7 +101,7 @@ class EkfConfig(Settings):
         return cls(**(preset | changes))
 
     @classmethod
-    def victoria_park(cls, **changes: Any) -> EkfConfig:
+    def victoria_park(cls, **changes: Any) -> "EkfConfig":
         """Tree trunks at up to 30 m, many of them missed or hidden behind people and cars."""
         preset: dict[str, Any] = {
             "noise_scale": 1.0,

@@ -10,8 +10,6 @@ should and does not adds log((1 - d) / (1 - c)), with d the probability of detec
 seeing something else there. At zero the object goes.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ Wrong poses blur the map, and lay the walls of a place beside those of an earlie
 number sees an error that is the same everywhere, such as a wrong scale, or a loop never driven.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import asdict, dataclass
 

@@ -5,8 +5,6 @@ Scans are laid over each other at given poses. Neighbouring returns on one surfa
 that a wall far away is a line and no dots. ``beside`` puts a log and its twin scan beside scan.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass

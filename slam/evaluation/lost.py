@@ -9,8 +9,6 @@ wrong gets further off, but gathers no error. Slow drift never rises that fast, 
 stay, and a correction is a fall.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

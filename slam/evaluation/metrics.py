@@ -7,8 +7,6 @@ alignment "none" expresses the truth in the frame of that known first pose and m
 is fair only to references without a common origin. Inputs are never changed.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import Literal, get_args
@@ -20,6 +18,7 @@ from slam import se2
 from slam.checked import frozen
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float
+from slam.shaped import one_of
 from slam.trajectory import Trajectory
 
 Alignment = Literal["none", "se2"]
@@ -121,8 +120,7 @@ def pose_errors(
     the error up to there is not counted. Raises ``InvalidValueError`` for an unknown alignment and
     when there is no common stamp.
     """
-    if align not in get_args(Alignment):
-        raise InvalidValueError(f"align must be one of {get_args(Alignment)}, got {align!r}")
+    one_of("align", align, get_args(Alignment))
     first_ns = int(estimate.stamps_ns[0]) if len(estimate) else None
     estimate, truth = associate(estimate, truth)
     T_map_world = se2.inverse(truth.poses[0])

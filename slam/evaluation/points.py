@@ -8,8 +8,6 @@ units of variances; as variances they would be steps with errors of 0.32 m and 1
 are read as what the text calls them, standard deviations.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass, fields

@@ -4,8 +4,6 @@
 Runs without a number take no part, except that a failed SLAM's errors count as infinite.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from typing import Any

@@ -10,8 +10,6 @@ The covariance is of the tangent at the pose, translation before rotation, in th
 turned. What a robot on a floor cannot do, z, roll and pitch, has the variance ``FLAT``.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

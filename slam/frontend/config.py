@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers of the front end that may be set; the others stand beside their equations."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from slam.settings import Settings, number

@@ -8,8 +8,6 @@ looks like an end is left out: the edge of a shadow that something nearer throws
 field of view, and mixed pixels, whose beam hit two surfaces and measured neither.
 """
 
-from __future__ import annotations
-
 import math
 
 import cv2

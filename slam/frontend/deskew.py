@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """De-skew: the end point of a beam where the robot was at the scan's stamp, once for all."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

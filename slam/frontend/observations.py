@@ -4,8 +4,6 @@
 ``slam.tracker.rasterise`` writes them onto a map.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 from functools import cached_property
@@ -90,7 +88,7 @@ class Observations:
         """Mean weight of the returns, 1 where nothing is known of them."""
         return float(self.votes.mean()) if self.votes is not None and len(self.votes) else 1.0
 
-    def with_votes(self, votes: Float | None, in_view: float | None = None) -> Observations:
+    def with_votes(self, votes: Float | None, in_view: float | None = None) -> "Observations":
         """The same with other weights, and ``in_view`` unless None: ``replace`` at a quarter of its
         time.
         """

@@ -6,8 +6,6 @@ Wheels of unequal size turn a robot that drives straight, a wrong track miscount
 the heading; left in, it leads a robot astray as soon as the map shows little.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field
 

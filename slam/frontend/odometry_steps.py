@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From frame to frame: the motion by odometry, and what can be none."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Compiled distances and angles of many points, whose last bit NumPy's change with the CPU."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

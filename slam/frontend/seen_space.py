@@ -5,8 +5,6 @@ A network of activities stores where something is, not where nothing is. A plann
 wants both, so whoever writes such a map keeps this beside it.
 """
 
-from __future__ import annotations
-
 import math
 
 import cv2

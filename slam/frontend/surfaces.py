@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which hits of a scan lie on one surface, and which on none."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ A neuron is hidden when the line from the laser to it passes through an observat
 of an interlaced scanner are not in order of bearing, so they are sorted into bins round the circle.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

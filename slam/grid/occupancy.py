@@ -5,8 +5,6 @@ It is there to compare with: what differs between "occupancy" and "shunting" on 
 the neural map alone, as matcher, prior, search and recovery are shared.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping
 from dataclasses import dataclass, field

@@ -6,8 +6,6 @@ for the guest all files but those listed here. With them go the memory, the desc
 environment of all other processes, for which the kernel asks the same question.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import shutil

@@ -8,8 +8,6 @@ called one by one, so that the pose predicted by odometry is the start. It sums 
 in no fixed order: two runs agree to about 1e-14 m a scan, not to the bit.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 import sys

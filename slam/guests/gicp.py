@@ -6,8 +6,6 @@ stay where they were matched, and each scan is matched to those kept nearest to 
 It is made for 3D scanners: scans are stacked in three layers, and the pose found is laid flat.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

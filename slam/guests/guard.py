@@ -18,8 +18,6 @@ Told none, it kills the processes whose environment has its mark (Linux). Worker
 one that is still being loaded has had no time to tie itself to its parent.
 """
 
-from __future__ import annotations
-
 import ctypes
 import errno
 import marshal

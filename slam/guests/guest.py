@@ -3,8 +3,6 @@
 matchers of others take it: in space, as ranges, against which kept scans.
 """
 
-from __future__ import annotations
-
 import importlib
 import math
 from abc import ABC, abstractmethod

@@ -6,8 +6,6 @@ Karto a scan is kept after some way or turn; each scan, kept or not, is matched 
 nearest to its predicted place, old ones too, so that a robot that comes back finds its old map.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any
 

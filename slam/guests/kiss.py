@@ -6,8 +6,6 @@ lies in the plane z = 0; voxels follow the scanner's beam spacing, not its range
 predicted by odometry goes in through ``last_delta`` in place of its constant velocity.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -5,8 +5,6 @@
 Python class the same way, so that neither its crash nor its endless loop is ours.
 """
 
-from __future__ import annotations
-
 import json
 import os
 import shlex

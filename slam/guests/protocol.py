@@ -9,8 +9,6 @@ that give back the same double, ranges and cells the same float32. Matrices are 
 ``SlamFailedError`` with outcome "nan" or "bad".
 """
 
-from __future__ import annotations
-
 import json
 import math
 import re

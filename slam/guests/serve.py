@@ -4,8 +4,6 @@
 What the SLAM prints goes to standard error: standard output belongs to the protocol.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import os

@@ -5,8 +5,6 @@
 what it is used for.
 """
 
-from __future__ import annotations
-
 import errno
 import marshal
 import os

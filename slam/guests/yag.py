@@ -5,8 +5,6 @@ As in Karto a scan becomes a vertex after some way or turn; the others are match
 vertices and left. A closed loop moves earlier poses: ``trajectory`` has them as they are now.
 """
 
-from __future__ import annotations
-
 import io
 import math
 from contextlib import redirect_stdout

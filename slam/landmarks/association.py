@@ -15,8 +15,6 @@ On linear problems the costs of IPJC sum up to the joint chi-square of all pairs
 Gaussian), which joint compatibility branch and bound (Neira and Tardos 2001) tests.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from typing import NamedTuple
 

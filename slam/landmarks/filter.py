@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The state of EKF-SLAM, pose and point landmarks, and the four things that happen to it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

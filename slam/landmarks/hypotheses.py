@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hypotheses of association: by which gates they are judged, what is found."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import lru_cache
 

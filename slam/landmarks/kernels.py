@@ -16,14 +16,14 @@ whose Jacobian at xi = 0 does not depend on the heading error at all: the filter
 that was never measured, the classic inconsistency of EKF-SLAM (Julier and Uhlmann 2001).
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
+
+Float = NDArray[np.float64]
 
 
 @njit
@@ -134,8 +134,6 @@ def mirror(P: Float, size: int) -> None:
         for j in range(i):
             P[j, i] = P[i, j]
 
-
-Float = NDArray[np.float64]
 
 ITERATIONS = 6
 SETTLED = 1e-10  # squared step of xi (m^2, rad^2) below which iterating stops

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags of ROS 2 (rosbag2 folder, .mcap, .db3) and ROS 1 (.bag) as frames, without ROS."""
 
-from __future__ import annotations
-
 import logging
 import math
 from collections import deque

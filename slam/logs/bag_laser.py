@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A bag's scanner and odometry: geometry, beam times, mounting, poses at the times of its scans."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Mapping, Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags opened by the rosbags library, with errors of our own, and which topics are read."""
 
-from __future__ import annotations
-
 from collections import Counter
 from collections.abc import Collection, Iterator
 from contextlib import contextmanager
@@ -75,7 +73,7 @@ class Bag:
         self.at = ""  # which message was read last, in the words of an error
         self._decode = ROS1.deserialize_ros1 if self.is_ros1 else ROS2.deserialize_cdr
 
-    def __enter__(self) -> Bag:
+    def __enter__(self) -> "Bag":
         with failing_as_ours(self.path):
             self._reader.open()
             self.topics: dict[str, tuple[str, int]] = {

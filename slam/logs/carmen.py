@@ -24,8 +24,6 @@ Ranges count counter-clockwise. ``remission_mode`` came with later versions; ``t
 written but not documented.
 """
 
-from __future__ import annotations
-
 import gzip
 import lzma
 import math

@@ -10,8 +10,6 @@ One message a line, lengths in cm, angles in rad, ``t`` in s from the start::
 counter-clockwise over the half circle ahead.
 """
 
-from __future__ import annotations
-
 from contextlib import suppress
 from itertools import islice
 from pathlib import Path

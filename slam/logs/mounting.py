@@ -6,8 +6,6 @@ counter-clockwise. Whether this can be is tested by what the robot drove between
 right mounting, odometry lays their points on each other; with a wrong one the walls move away.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

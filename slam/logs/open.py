@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One entry for all logs: the format follows from what is in the file."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 from pathlib import Path

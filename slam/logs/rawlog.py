@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rawlogs of MRPT: observations one by one, or pairs of actions and sensory frames."""
 
-from __future__ import annotations
-
 import gzip
 import math
 import re

@@ -10,8 +10,6 @@ Layouts after MRPT's sources: ``CObservation2DRangeScan`` (0 to 7), ``CObservati
 (0 to 2), ``CActionRobotMovement2D`` (0 to 7), ``CPose2D`` (0, 1), ``CPose3D`` (0 to 3).
 """
 
-from __future__ import annotations
-
 import math
 import re
 import struct

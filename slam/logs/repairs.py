@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was wrong with a log, its stamps above all, and put right: counted, said, or refused."""
 
-from __future__ import annotations
-
 import logging
 from collections import Counter
 from collections.abc import Iterable, Sequence

@@ -6,8 +6,6 @@ comes back as it was. Written and read by these functions, both do, bit for bit,
 reader sees the same message as ever.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@
 docs/logs.md has its keys; ``read_format`` refuses others. Columns count from 1.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from pathlib import Path

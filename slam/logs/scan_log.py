@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What text logs and rawlogs come to, whatever their format: scans and poses, made into frames."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import dataclass, field

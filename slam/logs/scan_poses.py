@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages of scans and of poses: one clock for all of them, and where each scan was taken."""
 
-from __future__ import annotations
-
 import bisect
 import math
 from collections.abc import Sequence

@@ -5,8 +5,6 @@ Whatever is wrong with a file is a ``LogFormatError``. What reads a word of it r
 with the field, the value and what was expected; ``about`` adds the file and the line.
 """
 
-from __future__ import annotations
-
 import gzip
 import lzma
 import math

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Packed bytes unpacked up to a limit: a small file may claim, and hold, more than any memory."""
 
-from __future__ import annotations
-
 import bz2
 import io
 import lzma

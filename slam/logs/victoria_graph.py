@@ -9,8 +9,6 @@ Poses are the rear axle's. The file has no times: ``stamped`` finds them by the 
 which is the same encoder's. Where the truck stands the time is undecided, and so does not matter.
 """
 
-from __future__ import annotations
-
 from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -40,7 +38,7 @@ class Graph:
     landmarks: Float
     edges: list[Edge]
 
-    def filtered(self) -> Graph:
+    def filtered(self) -> "Graph":
         """The poses of an EKF along the graph: least squares from dead reckoning finds another
         minimum, 100 m off."""
         n = len(self.poses)
@@ -61,7 +59,7 @@ class Graph:
             landmarks[node - n] = state.landmarks[at]
         return Graph(poses=np.array(poses), landmarks=landmarks, edges=self.edges)
 
-    def optimised(self) -> Graph:
+    def optimised(self) -> "Graph":
         """Least squares over all edges; observations of landmarks may be let go of."""
         start = self.filtered()
         nodes = np.concatenate([start.poses, np.pad(start.landmarks, ((0, 0), (0, 1)))])

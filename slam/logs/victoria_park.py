@@ -13,8 +13,6 @@ Read from the dataset's MATLAB files or from the text files of RFS-SLAM:
 The robot frame is the laser's: on the front left bumper, x forward.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

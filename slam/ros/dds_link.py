@@ -5,8 +5,6 @@ A topic "/scan" is "rt/scan" there, its type "sensor_msgs::msg::dds_::LaserScan_
 the definitions that ``slam.ros.template`` serialises by; the bytes go through as they are.
 """
 
-from __future__ import annotations
-
 import os
 import time
 from functools import cache
@@ -53,7 +51,7 @@ _ALONE = (
 _domains: dict[int, Domain] = {}
 
 
-def open_link(domain: int, namespace: str, _router: int) -> DdsLink:
+def open_link(domain: int, namespace: str, _router: int) -> "DdsLink":
     """A participant; other machines are seen where ``open_to_others`` or CYCLONEDDS_URI says so."""
     if domain not in _domains and "CYCLONEDDS_URI" not in os.environ and not open_to_others():
         _domains[domain] = Domain(domain, _ALONE)

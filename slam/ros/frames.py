@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Frames as the messages of their topics: what a bag holds and what goes over the network."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import NamedTuple

@@ -5,8 +5,6 @@ Two middlewares carry them: DDS (``dds``, what ROS 2 speaks by default) and Zeno
 nodes with ``rmw_zenoh_cpp``). Messages are the same bytes in both: CDR, as in a bag.
 """
 
-from __future__ import annotations
-
 import importlib
 import os
 import re

@@ -11,8 +11,6 @@ That is exact for a turn. For a whole interlaced scan it misleads, as that drive
 neighbours are a mirror turn apart. Hence ``/scan_turn``.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@
 Messages are bytes of strangers: bounded and checked.
 """
 
-from __future__ import annotations
-
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager

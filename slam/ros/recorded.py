@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What somebody's stack said while a bag was recorded, as a SLAM: to be scored after the fact."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot on the network: frames go out as its drivers would send them."""
 
-from __future__ import annotations
-
 from slam.estimate import Raster
 from slam.frames import Frame
 from slam.ros.frames import LATCHED, SCANS, STATE, FrameMessages

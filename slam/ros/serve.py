@@ -7,8 +7,6 @@ It hears /scan, /odom and /tf_static, and says /tf, /pose and, each second, /map
 namespace are those of ``slam.ros.link``. Ctrl-C ends it.
 """
 
-from __future__ import annotations
-
 import logging
 import sys
 import time

@@ -11,8 +11,6 @@ stands, carried on by odometry. No run repeats to the byte: what a node says dep
 A node that is started here has a domain of its own.
 """
 
-from __future__ import annotations
-
 import fcntl
 import os
 import shlex

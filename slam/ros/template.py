@@ -6,8 +6,6 @@ prototype whose variable numbers are marks; where a mark is found in its bytes, 
 of every later message go. The layout stays the library's business.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Mapping
 from itertools import islice
 from typing import Any

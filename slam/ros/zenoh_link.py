@@ -7,8 +7,6 @@ of liveliness are what ``ros2 topic list`` shows. Nodes meet at a router; where 
 usual port, we are it.
 """
 
-from __future__ import annotations
-
 import itertools
 import os
 import struct
@@ -33,7 +31,7 @@ _OVERRIDE = "ZENOH_CONFIG_OVERRIDE"
 _gids = itertools.count(1)
 
 
-def open_link(domain: int, namespace: str, router: int) -> ZenohLink:
+def open_link(domain: int, namespace: str, router: int) -> "ZenohLink":
     """A session: with a router that is there, or as the router."""
     return ZenohLink(_session(router), domain, namespace)
 

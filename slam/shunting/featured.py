@@ -15,8 +15,6 @@ map's activity, those looked at more than once first. Then Eq. (13):
 Whatever is seen is written to the map, paired or not.
 """
 
-from __future__ import annotations
-
 import dataclasses
 from collections import deque
 from collections.abc import Mapping

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The shunting SLAM: a short-term-memory map that forgets what moved, and scan matching on it."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from typing import ClassVar
 

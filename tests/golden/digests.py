@@ -12,8 +12,6 @@ A digest holds every bit, so it is promised only on the same versions, for SLAMs
 numbers beside it (end poses and the like) are compared everywhere, to ``TOLERANCE``.
 """
 
-from __future__ import annotations
-
 import argparse
 import csv
 import hashlib

@@ -5,8 +5,6 @@ What is recorded is so on every processor; estimates on those with fused multipl
 where the C library's sines round as they did.
 """
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Folders of somebody who wants our machine to run his code: it would touch a file in ``ran``."""
 
-from __future__ import annotations
-
 import json
 import pathlib
 import shutil

@@ -4,8 +4,6 @@
 ``ROWS`` is the list of what is covered; docs/trust.md says it in words.
 """
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

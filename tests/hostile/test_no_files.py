@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Named pipes, links and nested lists where files are expected: told, never waited for."""
 
-from __future__ import annotations
-
 import os
 from collections.abc import Callable
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nothing in the source can make code of what it reads."""
 
-from __future__ import annotations
-
 import ast
 from collections.abc import Iterable, Iterator, Mapping, Sequence
 from functools import cache
@@ -43,7 +41,6 @@ PRIVATE = {  # both ends are ours, over a socket that nobody else has
 STARTERS = {
     "slam/guests/wire.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
     "sim/view/gl.py": "our own Python, without the working folder",
-    "scripts/benches/cold.py": "our own Python, with an empty cache",
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/benches/shares.py": "perf and nm, on ourselves",
     "scripts/benches/sides.py": "the Python of each of two checkouts",

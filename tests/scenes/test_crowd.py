@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a crowd may be called, where it is put, and that it leaves the rest of a scene alone."""
 
-from __future__ import annotations
-
 from dataclasses import fields
 
 import numpy as np
@@ -11,7 +9,6 @@ import pytest
 from scenes import build
 from scenes.assembly import room_of
 from scenes.crowd import BY_LEVEL, GROUP, OTHERS_BY_LEVEL, Crowd, crowd_of, mix
-from scenes.crowd_kinds import ROW, far_ends, slots
 from scenes.kinds import kind_of
 from scenes.scene import Scene
 from sim.simulation import Simulation, tour
@@ -88,27 +85,6 @@ def test_nobody_stands_in_somebody_else(pair: tuple[Scene, Scene]):
         for other, ox, oy, other_r in discs:
             if name != other and not {name, other} <= before:
                 assert np.hypot(x - ox, y - oy) > r + other_r, (name, other)
-
-
-def test_everybody_has_a_part(pair: tuple[Scene, Scene]):
-    scene = pair[1]
-    does = {name: role.does for name, role in scene.roles.items()}
-    assert sum(what == "follow" for what in does.values()) == 4 + 3 + 1
-    assert len(scene.roles["cleaner0"].places) == ROW
-    assert {(hold.holder, hold.held) for hold in scene.holds} == {
-        ("board_pusher0", "board0"), ("carrier0", "couch0"), ("carrier1", "couch0"),
-    }  # fmt: skip
-
-
-def test_places_of_a_tour_are_apart():
-    places = np.array(list(slots(16)))
-    gaps = np.linalg.norm(places[:, None] - places[None], axis=2)
-    assert gaps[~np.eye(16, dtype=bool)].min() > 0.5
-    assert np.linalg.norm(places, axis=1).min() > 0.6
-
-
-def test_streams_go_between_the_far_ends():
-    assert set(far_ends(build("corridor", seed=1))) == {"west", "east"}
 
 
 @pytest.mark.parametrize("crowd", ["beds:4", "couches:3"])

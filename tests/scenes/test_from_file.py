@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes drawn in TOML: what they hold, and what is said of those that are wrong."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From a map to a plan: walls, gaps, things and floor are where the map has them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One row a kind of furniture: a part and its row are all that a new kind takes."""
 
-from __future__ import annotations
-
-import ast
 from pathlib import Path
 
 import numpy as np
@@ -43,17 +40,3 @@ def test_a_row_is_all_that_the_rest_reads(monkeypatch):
     message = ObjectsMessage(built.movers)
     message(0, poses, np.zeros(len(poses), dtype=bool))
     assert 0.25 in message._placed[:, 2]
-
-
-def test_no_second_list_of_kinds():
-    found = set()
-    for folder in ("scenes", "sim", "scripts"):
-        for path in (ROOT / folder).rglob("*.py"):
-            for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-                inside = getattr(node, "elts", None) or getattr(node, "keys", None) or []
-                words = {n.value for n in inside if isinstance(n, ast.Constant)}
-                if len(words & set(KINDS)) > 2:
-                    found.add(path.relative_to(ROOT).as_posix())
-    # the rows; what the groups are, some of which are called alike
-    of_groups = {"scenes/groups.py", "sim/actors/rearranging.py"}
-    assert found == {"scenes/kinds.py"} | of_groups

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Parts open alone, and painted floors tile."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes by name, with options; what cannot be is refused; scenes of other packages."""
 
-from __future__ import annotations
-
 import hashlib
 
 import pytest

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scanner's height is a parameter, and what the beam meets follows from it."""
 
-from __future__ import annotations
-
 import math
 from functools import cache
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What every scene promises, whatever its seed."""
 
-from __future__ import annotations
-
 import math
 from itertools import combinations
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What needs no simulator, compiler or figure loads none: lists, help and typing errors."""
 
-from __future__ import annotations
-
 import importlib
 
 import pytest

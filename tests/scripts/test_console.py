@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is printed where nobody sees a progress bar."""
 
-from __future__ import annotations
-
 import io
 import time
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Figures look the same whatever was drawn before."""
 
-from __future__ import annotations
-
 import matplotlib as mpl
 import numpy as np
 

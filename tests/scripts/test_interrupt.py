@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A signal unwinds the command; one that is ignored on purpose stays so."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

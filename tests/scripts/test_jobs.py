@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Jobs: whole files or none, what is there is not made again, and a killed run goes on."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

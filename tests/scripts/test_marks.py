@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Marked places of a page are filled, long tables lie beside it, results say what made them."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

@@ -1,9 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One row a metric: every command takes it from the table, and nobody keeps a list of his own."""
 
-from __future__ import annotations
-
-import ast
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -11,7 +8,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.comparison import maps, schema, tables
+from scripts.comparison import schema, tables
 from scripts.comparison.entry import scored
 from scripts.metrics import table
 from scripts.metrics.judged import Judged, lost_s
@@ -78,29 +75,6 @@ def test_a_new_row_is_computed_for_every_command(run, monkeypatch):
     row = scored(track, None, None, truth)
     assert row["largest_m"] == scores(track, truth, duration_s=8.0)["largest_m"]
     assert row["largest_m"] >= row["end_error_m"] > 0.0
-
-
-def test_what_a_map_is_judged_by_has_rows():
-    source = ast.parse(Path(maps.__file__).read_text(encoding="utf-8"))
-    judge = next(n for n in ast.walk(source) if getattr(n, "name", "") == "scores")
-    keys = {k for n in ast.walk(judge) if isinstance(n, ast.Dict) for k in _strings(n.keys)}
-    assert keys
-    assert keys <= {m.key for m in METRICS.values() if m.section == "maps"}
-
-
-def test_no_second_list_of_metrics():
-    found = set()
-    for path in (ROOT / "scripts").rglob("*.py"):
-        place = path.relative_to(ROOT).as_posix()
-        for node in ast.walk(ast.parse(path.read_text(encoding="utf-8"))):
-            inside = getattr(node, "elts", None) or getattr(node, "keys", None) or []
-            if len(_strings(inside) & set(METRICS)) > 6:
-                found.add(place)
-    assert not found
-
-
-def _strings(nodes: list[ast.expr | None]) -> set[str]:
-    return {n.value for n in nodes if isinstance(n, ast.Constant) and isinstance(n.value, str)}
 
 
 def judged(errors_m, *, sigma_m: float = 0.01, trusted=None, leap_at: int | None = None) -> Judged:

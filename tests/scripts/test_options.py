@@ -2,8 +2,6 @@
 """Options of several verbs: the axes, the crowd and the scanner mean the same on every verb, in
 recipes, comparisons, drives, re-runs and environments."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

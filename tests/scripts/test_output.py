@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Output folders appear whole or not at all, and nobody's files are ever replaced."""
 
-from __future__ import annotations
-
 import json
 import os
 from pathlib import Path

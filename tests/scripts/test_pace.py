@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Estimates come from what work took before, in a cache that nobody has to have."""
 
-from __future__ import annotations
-
 import pytest
 
 from scripts import pace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Worker processes end with the command, and no command takes up a folder that they still write."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A small model with a planar robot, for the sensor tests: no scene needed."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 

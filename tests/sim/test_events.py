@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Events of a run: what was pushed, swung, came near, and when the robot was put elsewhere."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from types import SimpleNamespace
 from typing import Any

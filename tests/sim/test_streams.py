@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Change one stream of randomness and no other part draws anything else: pairwise."""
 
-from __future__ import annotations
-
 import hashlib
 from typing import Any
 

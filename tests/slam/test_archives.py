@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Archives of arrays: the same arrays, or one error that names the file."""
 
-from __future__ import annotations
-
 import io
 import os
 import zipfile

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages are one line that a terminal shows and does not obey, whoever's words are in them."""
 
-from __future__ import annotations
-
 import inspect
 import pickle
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Files appear whole or not at all, and cells of a CSV are no formulas."""
 
-from __future__ import annotations
-
 import errno
 import os
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The types that flow: what they refuse, and that nobody can change them afterwards."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 

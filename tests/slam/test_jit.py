@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compile cache notices a change in a kernel of another module; compiling is said once."""
 
-from __future__ import annotations
-
 import gc
 import logging
 import os

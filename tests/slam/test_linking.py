@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Kernels are optimised once: what only kernels call is never made executable by itself."""
 
-from __future__ import annotations
-
 import numba
 import numpy as np
 import pytest

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One writer at a time, and none while workers of an earlier one have not ended."""
 
-from __future__ import annotations
-
 import pytest
 
 from slam import locks

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Map files: what ROS loads is what was meant."""
 
-from __future__ import annotations
-
 import hashlib
 import os
 import zlib

@@ -2,8 +2,6 @@
 """The oracle: movers' returns are taken out by the labels, nothing else is, and nobody else sees
 labels."""
 
-from __future__ import annotations
-
 import copy
 import sys
 from dataclasses import replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The oracle by the true map: a known pose is found again, and a crowd does not make it lost."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

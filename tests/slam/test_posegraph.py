@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pose graphs with a known answer."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

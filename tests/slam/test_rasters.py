@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A part of a raster lies where it lay; wider cells keep the largest; a large map has them."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A replay gives every SLAM the same frames and never the truth."""
 
-from __future__ import annotations
-
 import pickle
 import re
 from dataclasses import replace

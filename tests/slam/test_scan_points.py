@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The helpers of a guest's author: a scan as points, moved and unmoved."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

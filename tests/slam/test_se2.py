@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """SE(2): the laws of the group, its exponential, its first-order statistics."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Numbers with an address: checked, set by path, named by a digest; and every one of ours."""
 
-from __future__ import annotations
-
 import importlib
 import json
 import math

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The protocol, its registry, estimates and rasters; and the null system, odometry."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Trajectories, the TUM files that evo reads, and the path of reported poses."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

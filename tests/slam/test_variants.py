@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """SLAMs named with numbers: in ``create``, in maps on file, and by ``--set``."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import dataclass
 from pathlib import Path

@@ -5,8 +5,6 @@ Reciprocal velocity obstacles by sampling (van den Berg, Lin, Manocha, ICRA 2008
 from the clearance field, the discs of all that moves and the angles of doors.
 """
 
-from __future__ import annotations
-
 import math
 
 from sim.actors.config import ACTORS

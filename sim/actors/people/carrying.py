@@ -4,8 +4,6 @@
 Cleaners take chairs to a row at a wall, and later back to where they stood.
 """
 
-from __future__ import annotations
-
 import math
 
 from sim.actors.config import ACTORS

@@ -5,8 +5,6 @@ From Python a column is ``state["speed"]``. Here too are the values of the colum
 words, imported as a module: ``task[i].walking == columns.FOLLOWS``.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from sim.core.state import record

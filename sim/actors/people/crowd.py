@@ -7,8 +7,6 @@ hits nothing soon (``sim.actors.people.avoidance``). A person whose way is block
 patience and pushes it; now and then one sits down (``sim.actors.people.trips``).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

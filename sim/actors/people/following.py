@@ -8,8 +8,6 @@ it step back, which lets it out of a corner. Everybody makes way for the robot a
 held up. Who is held up near the place rests there for a while.
 """
 
-from __future__ import annotations
-
 import math
 
 from sim.actors.config import ACTORS

@@ -7,8 +7,6 @@ slide. Lengths (thigh 0.455 m, shank 0.435 m, hip 0.90 m) are those of ``scenes/
 shorter legs would clip the reach and skate.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -5,8 +5,6 @@ The course turns after the leader slowly: a robot that turns on the spot does no
 about.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

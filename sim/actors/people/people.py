@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The people of a scene: arrays for the compiled kernels of ``crowd`` and ``gait``."""
 
-from __future__ import annotations
-
 import functools
 import math
 from collections.abc import Sequence

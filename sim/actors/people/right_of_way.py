@@ -4,8 +4,6 @@
 Also the tables that all kernels of the crowd share, one row for each person, disc or door.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

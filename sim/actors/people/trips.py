@@ -7,8 +7,6 @@ when its sitter shifts. Sitter and chair do not collide with each other from the
 down until they are apart again (``dress``).
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -7,8 +7,6 @@ a world of planar movers keeps its height, so the list holds for the whole run; 
 height (limbs, free bodies) is always kept.
 """
 
-from __future__ import annotations
-
 import math
 
 import mujoco

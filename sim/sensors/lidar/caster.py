@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scanner's beams cast on the geoms of one model, each at its own time."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass
@@ -40,7 +38,7 @@ class FanPlan:
     @classmethod
     def of(
         cls, fans: Sequence[tuple[NDArray[np.int64], Float, NDArray[np.int64], Float]]
-    ) -> FanPlan:
+    ) -> "FanPlan":
         """From (beams, angles, slots, parts) of each fan."""
         beams, angles, slots, parts = (np.concatenate(column) for column in zip(*fans, strict=True))
         cos, sin = ([f(a) for a in angles.tolist()] for f in (math.cos, math.sin))

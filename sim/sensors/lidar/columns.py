@@ -4,8 +4,6 @@
 Imported as a module: ``fan[i, col.AZIMUTH]``.
 """
 
-from __future__ import annotations
-
 # A geom, (n, 7): mjtGeom, size, half its height, whether it is a box that stands upright for good;
 # the layer, 0 for the room, 1 for panes that a beam may pass.
 KIND, SIZE_X, SIZE_Y, SIZE_Z, HALF_HEIGHT, UPRIGHT, LAYER = range(7)

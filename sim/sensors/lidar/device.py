@@ -6,8 +6,6 @@ are linear between physics steps. A scan may begin and end between two steps
 (``sim.sensors.lidar.schedule``).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Mapping
 from fractions import Fraction

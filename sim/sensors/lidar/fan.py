@@ -6,8 +6,6 @@ several of them. Every beam has its own time, hence its own origin and direction
 moves; and so do the things: poses are noted at the physics steps and are linear in between.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

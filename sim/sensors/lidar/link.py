@@ -8,8 +8,6 @@ whole scans; 19.2 kBd is inferred from the same rule. At 500 kBd (RS 422) nothin
 508 bytes leave during a turn of the mirror (TL p22), so telegrams overlap with measuring.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable, Iterator
 from dataclasses import dataclass

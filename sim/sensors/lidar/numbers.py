@@ -5,8 +5,6 @@ Units follow from a field's name, meanings are the words of its docstring, sourc
 model's data sheet (``sim.sensors.lidar.sheet``).
 """
 
-from __future__ import annotations
-
 import inspect
 import re
 from collections.abc import Iterator

@@ -5,8 +5,6 @@ The intersection formulas are those of MuJoCo's ``engine_ray.c``, evaluated in t
 that ranges agree with ``mj_multiRay`` to the last bit.
 """
 
-from __future__ import annotations
-
 import math
 
 from sim.sensors.lidar import columns as col

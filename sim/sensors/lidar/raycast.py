@@ -5,8 +5,6 @@ Each beam meets each moving geom at the beam's own time: poses are linear betwee
 beam is k rays over the disc of its spot; an ideal beam is the one ray in the middle.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One scan from what its rays hit; every scan takes the same number of draws."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass

@@ -8,8 +8,6 @@ errors alone (``noise``) are those of the LMS-221. Writing never names code: wha
 is refused.
 """
 
-from __future__ import annotations
-
 import importlib
 import inspect
 import pkgutil
@@ -36,7 +34,7 @@ class ScannerConfig(Protocol):
     def scanner(self) -> Scanner:
         """The model that is set so."""
 
-    def only(self, errors: str) -> ScannerConfig:
+    def only(self, errors: str) -> "ScannerConfig":
         """With those errors alone: "full", "noise" or "ideal"."""
 
     def spec(self, T_robot_laser: Float | None = None) -> LaserSpec:

@@ -5,8 +5,6 @@ A model is one ``Scanner``, put together out of parts; a part that is left out i
 Nothing here knows of the physics: when a beam is measured is a time, not a number of steps.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
@@ -200,11 +198,11 @@ class Scanner:
 
     # -- as a config of the device ------------------------------------------------------------
 
-    def scanner(self) -> Scanner:
+    def scanner(self) -> "Scanner":
         """Itself, as any config of a scanner gives one."""
         return self
 
-    def only(self, errors: str) -> Scanner:
+    def only(self, errors: str) -> "Scanner":
         """With the errors named in ``ERRORS``: "full" is the model as it stands."""
         if errors == "full":
             return self

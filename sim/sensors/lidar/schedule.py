@@ -6,8 +6,6 @@ world stands at is its phase; a scan with a phase needs the poses of the step be
 a scan are counted in rows: row 0 is the last step at or before its start.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass

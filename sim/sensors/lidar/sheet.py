@@ -4,8 +4,6 @@
 ``mobilia sensor-card --scanner NAME`` measures the simulated scanner against these rows.
 """
 
-from __future__ import annotations
-
 import sys
 from dataclasses import dataclass
 

@@ -12,8 +12,6 @@ unit's own tables and rounded to the code of the range mode (TL p113). TD and TL
 of the LMS-221 (``sim.sensors.lidar.models.lms221``), whose receiver this is.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the surfaces of a model are to a beam of 905 nm, by the names of their materials."""
 
-from __future__ import annotations
-
 from functools import cache
 from types import MappingProxyType
 from typing import Any

@@ -7,8 +7,6 @@ tests instead of one for every geom. Bounds are generous by ``SLACK``; the exact
 ``sim.sensors.lidar.ray_shapes``.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How wrong a robot's wheels are, and named presets with their sources."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from types import MappingProxyType

@@ -15,8 +15,6 @@ systematic part is fully correlated, which no independent increment covariance c
 increments over many metres must add to it (``WheelOdometry.systematic_std`` has the numbers).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import Any

@@ -8,8 +8,6 @@ variances are those of windows, and what does not grow is no part of a twin's od
 a twin is the log's own, drawn again with replacement: slips stay as rare and as large as they were.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import pairwise

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One motion of the wheels and what it does to pose, increment and covariance, compiled."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -4,8 +4,6 @@
 An edge has nothing between its two surfaces, a mixed pixel (the spot lights both), or a lost beam.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass

@@ -5,8 +5,6 @@ Beams of one place are not independent: they hit the same wall, the same edge. S
 are drawn again, not beams.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -44,7 +42,7 @@ class Figure:
         """Whether there were stretches enough to draw from."""
         return math.isfinite(self.low) and math.isfinite(self.high)
 
-    def if_of(self, least: int) -> Figure:
+    def if_of(self, least: int) -> "Figure":
         """Itself, where it is of so many beams, walls or edges; less says nothing."""
         return self if self.n >= least else NOTHING
 

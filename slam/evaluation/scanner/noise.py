@@ -2,8 +2,6 @@
 """Noise of ranges: from scan to scan of a robot that stands, and about straight walls in a scan;
 in which steps ranges are coded, and what rounding does to noise."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from functools import partial

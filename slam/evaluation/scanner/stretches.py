@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A log in stretches: where the robot stood still, and blocks of scans while it drove."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from dataclasses import dataclass
 

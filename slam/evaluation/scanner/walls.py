@@ -5,8 +5,6 @@ A straight line at distance d, whose normal points to a, is at range r = d / cos
 linear in cos(phi) and sin(phi). Weighted by r^4, the residuals are those of the ranges themselves.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import dataclass

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a network says as rasters: what exists, and what changed between its two memories."""
 
-from __future__ import annotations
-
 import cv2
 import numpy as np
 from numpy.typing import NDArray

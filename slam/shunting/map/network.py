@@ -5,8 +5,6 @@ The short-term mean is the activity x of Eq. (8), which leaks; the long-term one
 Blocks of neurons are born under an observation and die when every neuron in them is silent.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

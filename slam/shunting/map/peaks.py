@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Landmarks of a shunting map: where its activity peaks, between neurons."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

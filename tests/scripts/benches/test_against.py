@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ratios to others: the interval is of the pairs, and the bare rays are those of the scan."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A square room of 8 x 8 m with one chair and one door, seen by an ideal scanner, made by hand."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

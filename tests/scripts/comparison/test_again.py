@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run of a comparison, simulated again for a film or an inquest, is the run on file."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

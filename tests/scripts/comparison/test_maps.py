@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores of maps on a room made by hand: known ghosts, known new places."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
 import pytest
 
-from scripts.comparison.maps import BEYOND_M, MapJudge, Sight, disc, seen_empty
+from scripts.comparison.maps import MapJudge, seen_empty
 from tests.scripts.comparison.hand_made import HZ, WALL_M, raster, recording
 
 HERE, THERE = (2.0, 0.0), (1.5, 1.5)
@@ -62,13 +60,6 @@ def test_a_drifted_map_is_judged_where_it_lies():
     assert judged(drive, lambda k: shifted).scores()["ghost_rate"] > 0.15
 
 
-def test_what_a_scan_saw():
-    sight = Sight(recording([HERE]), 0)
-    assert np.nanmin(np.hypot(*sight.points.T)) == pytest.approx(1.9, abs=1e-3)
-    places = np.array([[1.0, 0.5], [3.0, 0.0], [1.95, 0.0], [-1.0, 0.0], [3.9, 1.0]])
-    assert (sight.beyond(places) > BEYOND_M).tolist() == [True, False, False, False, False]
-
-
 def test_the_last_scan_with_a_say_tells_whether_a_place_is_empty():
     """The chair came to ``HERE``; behind it nobody has a say any more, but earlier scans had."""
     places = np.array([HERE, THERE, [HERE[0] + 1.0, HERE[1]], [-1.0, 0.0]])
@@ -78,8 +69,3 @@ def test_the_last_scan_with_a_say_tells_whether_a_place_is_empty():
 
 def test_no_map_has_no_scores():
     assert judged(recording([HERE] * 11), lambda k: None).scores() == {}
-
-
-def test_disc():
-    assert disc(0.1, 0.05).sum() == 13
-    assert disc(0.01, 0.05).tolist() == [[1]]

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """An oracle in a comparison: labels reach it through the recording, and nobody else."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np
@@ -11,8 +9,6 @@ import slam
 from scripts.comparison import entry, folder, make
 from scripts.comparison.plan import Plan
 from scripts.comparison.recording import load
-from scripts.imports import source_of
-from scripts.names import file_name
 from scripts.output import slams_of
 from sim.simulation import Simulation, tour
 from slam import system
@@ -78,14 +74,3 @@ def test_in_a_room_without_movers_the_oracle_is_the_slam():
         [e.T_map_robot.tobytes() for e in t.estimates] for t in replay.tracks.values()
     )
     assert all(other == first for other in others)
-
-
-def test_names_of_files_and_code_within():
-    assert file_name("oracle(shunting,moving)") == "oracle-shunting-moving-"
-    names = {
-        file_name(name) for name in ("shunting", "oracle(shunting)", "oracle(shunting,moving)")
-    }
-    assert len(names) == 3
-    assert source_of("oracle(tests.slam.guests.misbehaving:Any,moving)") == source_of(
-        "tests.slam.guests.misbehaving:Any"
-    )

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison scores what SLAMs from outside do to it, and goes on."""
 
-from __future__ import annotations
-
 import json
 import math
 import mmap

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A small building in a comparison: who lives in it, who starts anew, who fails, what is kept."""
 
-from __future__ import annotations
-
 import csv
 import json
 import shutil

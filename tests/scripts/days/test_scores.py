@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scores of age on rows made by hand: what is added up, and what a SLAM without days has."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

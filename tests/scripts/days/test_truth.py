@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The score of a list of changes, by hand, and what the tables of a building say."""
 
-from __future__ import annotations
-
 from types import SimpleNamespace
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The counterfactual debugger on SLAMs whose weakness is known by construction."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

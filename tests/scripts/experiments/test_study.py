@@ -1,10 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Studies: what is run once, what is pooled, and what each of them declares."""
 
-from __future__ import annotations
-
 import importlib
-import re
 from pathlib import Path
 
 import numpy as np
@@ -115,26 +112,3 @@ def test_cells_of_tracks_are_geometric_means_and_losses_are_counted():
     head, _, whole, *_ = ablation.STUDY.markdown(rows).splitlines()
     assert head == "| slam | tour-guide-v1 | no-walls-v1 | all |"
     assert whole == "| shunting | 2.00, 1 of 2 | 1.00, 0 of 1 | 1.41 |"
-
-
-ROOT = Path(__file__).parents[3]
-
-
-def test_every_experiment_has_a_line():
-    page = (ROOT / "docs" / "experiments.md").read_text(encoding="utf-8")
-    listed = set(re.findall(r"^\| `(\w+)` \|", page, flags=re.MULTILINE))
-    there = {
-        path.stem
-        for path in (ROOT / "scripts" / "experiments").glob("*.py")
-        if '__name__ == "__main__"' in path.read_text(encoding="utf-8")
-    }
-    assert listed == there
-    for link in re.findall(r"\]\((\w+\.md)\)", page):
-        assert (ROOT / "docs" / link).is_file(), link
-
-
-def test_every_module_is_named_on_a_page():
-    pages = "".join(p.read_text(encoding="utf-8") for p in (ROOT / "docs").rglob("*.md"))
-    for folder in ("experiments", "paper"):
-        for path in (ROOT / "scripts" / folder).glob("[!_]*.py"):
-            assert f"{path.name}`" in pages or f"| `{path.stem}` |" in pages, path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The chart of a film: curves at their heights, the band as claimed, events at their times."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 

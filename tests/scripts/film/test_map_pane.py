@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the film shows is where it is: a cell of the map lands on the pixel of its centre."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

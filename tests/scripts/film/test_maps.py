@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Maps for pictures: thin walls stay, in no more cells than a picture has room for."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
 from scripts.film.encode import LAPSE_FPS, MOST_PICTURES, Pace
 from scripts.single_run.session import drawn, for_file
-from sim.view import moment
 from slam import create
 from slam.frames import LaserSpec, Scan
 from slam.frontend.seen_space import SeenSpace
@@ -76,13 +73,3 @@ def test_the_film_of_a_long_log_has_a_bounded_number_of_pictures():
     assert (short.speed, short.fps) == (1.0, 10.0)
     assert Pace.of_log(10.0, 375).fps == 30.0
     assert Pace.of_log(0.0, 1).due(0.0) == 1
-
-
-def test_a_map_as_shown_keeps_thin_walls(monkeypatch):
-    raster = made(1001, 530)
-    monkeypatch.setattr(moment, "MOST_CELLS", 300)
-    found = moment.small_map(Track("kept", Kept(raster)))
-    assert max(found.values.shape) <= 300
-    assert found.resolution_m == pytest.approx(4 * CELL)
-    assert np.nanmax(found.values) == np.nanmax(raster.values)
-    assert moment.small_map(Track("none", create("odometry"))) is None

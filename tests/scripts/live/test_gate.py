@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who may connect to a live view: pages of other sites may not, whatever they write."""
 
-from __future__ import annotations
-
 import socket
 import threading
 import time

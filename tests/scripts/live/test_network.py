@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What others on a network of ROS 2 ask of a live view, and what is refused."""
 
-from __future__ import annotations
-
 import threading
 import time
 from contextlib import closing

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Play, pause, step and seek, and the pace, without a world and without a wall clock."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 from typing import Any

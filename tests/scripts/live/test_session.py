@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is served is what is run: the same scans, whoever watches; logs as well."""
 
-from __future__ import annotations
-
 import math
 from itertools import islice
 
@@ -15,7 +13,6 @@ from sim.moments import toured
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
 from sim.simulation import Simulation
-from sim.view.moment import Path
 from sim.view.parts import STATIC, Parts, Placed
 from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError, NeedsLabelsError, UnknownNameError
@@ -123,16 +120,6 @@ def test_every_part_of_a_room_is_where_mujoco_has_it_and_a_ray_finds_it():
     assert name == world.mover_names[chair]
     assert place[2] > 0.2
     assert parts.hit((0.0, 0.0, 9.0), (0.0, 0.0, 1.0)) is None
-
-
-def test_a_path_is_thinned_and_ends_where_the_robot_is():
-    path = Path()
-    for k in range(5000):
-        path.add(np.array([k, math.nan if k == 7 else 0.0, 0.0]))
-    assert path.points(100, 3)[:, 0].tolist() == [0.0, 1.0, 2.0, 3.0]
-    thin = path.points(100, 4321)
-    assert len(thin) <= 103
-    assert thin[-1, 0] == 4321.0
 
 
 def test_a_bag_is_shown_with_its_truth_and_labels(tmp_path):

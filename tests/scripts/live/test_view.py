@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page in a real browser: it draws, keys drive, clicks shove, the past is shown again."""
 
-from __future__ import annotations
-
 import io
 import math
 import re

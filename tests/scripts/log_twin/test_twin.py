@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The twin of a log of ours: its scans are those of the log, and SLAMs take it as they take one."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The page of a folder: what is there is listed, what is not is left out, nothing is loaded."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

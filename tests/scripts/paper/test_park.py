@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The rules by which a drive through Victoria Park is scored."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results on a page: tables between marks, pictures small and beside it."""
 
-from __future__ import annotations
-
 import io
 from pathlib import Path
 
@@ -13,7 +11,6 @@ from PIL import Image
 from scripts.paper.quote import compact, quote
 from scripts.paper.report import TABLE_3, Report, new_figure, paper_table
 from scripts.paper.runs import Plan
-from scripts.verbs.reproduce import EXPERIMENTS
 from slam.errors import InvalidValueError
 
 ROOT = Path(__file__).parents[3]
@@ -40,13 +37,6 @@ def test_a_page_quotes_what_was_run_and_keeps_the_rest(tmp_path):
     with pytest.raises(InvalidValueError, match="<!-- chairs --> before <!-- /chairs -->"):
         quote(tmp_path, folder)
     assert page.read_text() == mixed_up
-
-
-def test_the_real_pages_mark_every_experiment_once():
-    pages = [page.read_text() for page in (ROOT / "docs" / "paper").glob("*.md")]
-    for name in EXPERIMENTS:
-        assert sum(text.count(f"<!-- {name} -->") for text in pages) == 1, name
-        assert sum(text.count(f"<!-- /{name} -->") for text in pages) == 1, name
 
 
 def test_its_figures_come_along_and_those_of_before_go(tmp_path: Path):

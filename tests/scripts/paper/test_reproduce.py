@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The experiments end to end, as short as they can be, and the rules by which they score."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

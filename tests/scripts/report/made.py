@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison of three SLAMs made by hand: who wins where is known, nothing is simulated."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

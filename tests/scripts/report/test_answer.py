@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sentence on top: what it says in each case, however few the runs."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from typing import Any
 

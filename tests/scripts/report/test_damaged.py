@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A comparison that somebody harmed is shown or refused in a line, and ``verify`` agrees."""
 
-from __future__ import annotations
-
 import json
 import shutil
 from pathlib import Path

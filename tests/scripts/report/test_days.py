@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report's section over days: there where there are buildings, and only there."""
 
-from __future__ import annotations
-
 import html
 import re
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The report says who wins where, opens from disk alone, and refuses what is no comparison."""
 
-from __future__ import annotations
-
 import json
 import math
 import re

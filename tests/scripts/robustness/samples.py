@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small results of the verbs, who reads them, and random damage to them."""
 
-from __future__ import annotations
-
 import shutil
 import tempfile
 from collections.abc import Callable, Iterator, Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever is done to a result, verify says so, and nobody reads something else from it."""
 
-from __future__ import annotations
-
 import json
 import shutil
 import subprocess

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A full disk is one line that names what the user named; nothing half-written is left."""
 
-from __future__ import annotations
-
 import os
 import shutil
 import subprocess

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Odd input succeeds or raises our own errors: damaged files, and extreme frames."""
 
-from __future__ import annotations
-
 import gzip
 import math
 from collections.abc import Callable

@@ -5,8 +5,6 @@ A file system keeps the bytes of a file once the file was synced, and a name onc
 So the order of the calls is what is held here.
 """
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a run says of its log: where the scanner is, what flag to give, why it was not trusted."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 from types import SimpleNamespace

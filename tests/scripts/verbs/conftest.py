@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line without a process of its own."""
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Callable
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The command line as people meet it: the whole run, and every wrong input as one clear line."""
 
-from __future__ import annotations
-
 import json
 import signal
 import subprocess
@@ -72,15 +70,6 @@ def test_the_files_for_other_tools_can_be_read_back(finished):
     raster = read_map(out / "map.yaml")
     assert (raster.values == 1.0).sum() > 100
     assert np.isnan(raster.values).any()
-
-
-def test_verify_tells_a_wrong_path_from_a_damaged_result(tmp_path: Path, called):
-    (tmp_path / "recipe.json").write_text("{")
-    (tmp_path / "SHA256SUMS").write_text(f"{'0' * 64}  recipe.json\n")
-    assert called("verify", tmp_path).returncode == 1
-    missing = called("verify", tmp_path / "none")
-    assert missing.returncode == 2
-    assert "none: no such file or folder" in missing.stderr
 
 
 def test_a_damaged_log_is_named_and_nothing_is_written(tmp_path: Path, called):

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia config`` prints every number, and ``--set`` reaches recipes."""
 
-from __future__ import annotations
-
 import json
 import re
 from pathlib import Path

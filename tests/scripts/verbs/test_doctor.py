@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia doctor`` says what is there, what is not, and how to get it."""
 
-from __future__ import annotations
-
 import os
 import tomllib
 from importlib import metadata

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia drive``: tables of every run, made where they are missing and found where not."""
 
-from __future__ import annotations
-
 import csv
 import json
 
@@ -14,7 +12,6 @@ from scripts.closed_loop.plan import Plan
 from scripts.closed_loop.runs import DrivenRun, load, run_one
 from scripts.verbs.drive import _seeds
 from sim.loop import LoopConfig
-from slam.errors import OutputError
 
 SHORT = {"goals": 1, "loop": LoopConfig(limit_s=1.0)}
 FILES = ("goals.csv", "runs.csv", "levels.csv", "runs.json", "closed_loop.png", "paths.png")
@@ -48,19 +45,6 @@ def test_a_killed_call_goes_on_and_ends_with_the_same_bytes(tmp_path):
     ]
     recipe = json.loads((tmp_path / "out" / "recipe.json").read_text())
     assert recipe["settings"]["loop"]["limit_s"] == 1.0
-
-
-def test_a_run_depends_on_what_drives_it_and_not_on_tables():
-    ((_, job),) = plan().jobs()
-    names = {path.name for path in job.code}
-    assert {"slam", "sim", "scenes", "runs.py"} <= names
-    assert not {"plan.py", "tables.py", "pictures.py", "film.py"} & names
-
-
-def test_somebody_elses_folder_is_refused(tmp_path):
-    (tmp_path / "thesis.tex").write_text("")
-    with pytest.raises(OutputError, match="choose another"):
-        carry_out(plan(), tmp_path)
 
 
 def test_seeds_are_a_number_or_a_list():

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A dataset ends with the same bytes however it was made; every fault is one clear line."""
 
-from __future__ import annotations
-
 import json
 import os
 import shutil

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia lifelong`` and the sessions of ``mobilia run``: what is refused, a small building."""
 
-from __future__ import annotations
-
 import csv
 import json
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia list`` is whole and plain, in a file as on a terminal."""
 
-from __future__ import annotations
-
 import io
 
 import pytest

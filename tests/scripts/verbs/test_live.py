@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia live``: what it refuses before anything is built, and when it warns."""
 
-from __future__ import annotations
-
 import sys
 from types import SimpleNamespace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia run --log``: formats, one warning, ``--strict``, what it cost, what it films."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

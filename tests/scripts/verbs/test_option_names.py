@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What cannot be is said by the name of the option that was typed."""
 
-from __future__ import annotations
-
 import re
 
 import pytest

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia score``: what a stack said in a bag, beside the truth of another one."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

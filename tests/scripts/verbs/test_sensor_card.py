@@ -4,8 +4,6 @@
 Beside a real log, simulated scans are measured by the same code.
 """
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia generate --sessions``: the same bytes however made, and a truth that is of the bags."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Wrong words after every verb: one line that names what was typed, a status, nothing written."""
 
-from __future__ import annotations
-
 import re
 from pathlib import Path
 

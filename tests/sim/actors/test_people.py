@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """People and doors of the office: where they go, what they respect, what gives way to them."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
@@ -19,20 +17,9 @@ def walk() -> dict[str, np.ndarray | World]:
     """75 s of a busy office, one sample in 0.1 s."""
     world = World("office", seed=2, dynamism=Dynamism.world_1(0.8))
     people = world.people
-    poses, clearances, tasks, slips = [], [], [], []
-    shanks = np.array([[world.model.body(f"{p}/shank_{s}").id for s in "lr"] for p in people.names])
-    before, swung = None, None
+    poses, clearances, tasks = [], [], []
     for k in range(75 * SUBSTEPS_PER_S):
         world.substep()
-        frames = world.data.xmat[shanks].reshape(-1, 2, 3, 3)
-        soles = world.data.xpos[shanks] - gait.SHANK * frames[..., 2]
-        swing = people.feet[:, gait.SWING].copy()
-        if before is not None:
-            for foot in range(2):
-                planted = (swing != foot) & (swung != foot)
-                moved = np.linalg.norm(soles[planted, foot] - before[planted, foot], axis=1)
-                slips.append(moved * SUBSTEPS_PER_S)
-        before, swung = soles, swing
         if k % 30 == 0:
             now = world.mover_poses()[_rows(world, "person")]
             poses.append(now)
@@ -43,7 +30,6 @@ def walk() -> dict[str, np.ndarray | World]:
         "poses": np.array(poses),
         "clearances": np.array(clearances),
         "tasks": np.array(tasks),
-        "slips": np.concatenate(slips),
     }
 
 
@@ -94,10 +80,6 @@ def test_people_are_rarely_blocked(walk):
     assert blocked.sum() / walked.sum() < 0.10
 
 
-def test_stance_feet_do_not_slip(walk):
-    assert np.mean(walk["slips"]) < 0.01
-
-
 def test_the_physics_has_nothing_to_warn_of(walk):
     assert not any(w.number for w in walk["world"].data.warning)
     assert np.isfinite(walk["world"].data.qpos).all()
@@ -114,18 +96,6 @@ def test_who_has_a_foot_in_the_air_moves():
 
 def _door_angle(world: World, door: str) -> float:
     return float(world.data.qpos[int(world.model.joint(f"{door}/hinge").qposadr[0])])
-
-
-def test_a_door_goes_back_to_rest():
-    world = World("office", seed=1, dynamism=0, n_people=0)
-    door = world.scene.movers[_rows(world, "door")[0]].name
-    rest = _door_angle(world, door)
-    at = int(world.model.joint(f"{door}/hinge").qposadr[0])
-    world.data.qpos[at] = 0.2
-    for _ in range(12 * SUBSTEPS_PER_S):
-        world.substep()
-    assert _door_angle(world, door) == pytest.approx(rest, abs=0.12)
-    assert not world.movers_moving()[_rows(world, "door")[0]]
 
 
 def test_closed_doors_open_for_a_person_from_both_sides_and_close_behind():

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Change out of sight: as much as was asked for, never in view, never into anything."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 
 import numpy as np
@@ -182,9 +180,3 @@ def test_nothing_is_changed_that_was_never_seen():
     before = simulation.world.mover_poses()
     assert simulation.world.rearrange(simulation.spec) == []
     assert np.array_equal(before, simulation.world.mover_poses())
-
-
-@pytest.mark.parametrize("wrong", [-0.1, 1.1, float("nan"), "all"])
-def test_a_share_that_is_none_is_refused(wrong):
-    with pytest.raises(InvalidValueError, match="change"):
-        made("arena", 0, wrong)

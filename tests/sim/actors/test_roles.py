@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Crowds do what ``scenes.crowd`` says of each kind."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sliding doors and the lift: who is let through, and that nobody is hurt."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from functools import cache

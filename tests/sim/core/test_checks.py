@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Values of the wrong type are refused by name, wherever a user sets one."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from typing import Any

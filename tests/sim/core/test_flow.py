@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Clearance and ways on floors whose answer is known."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

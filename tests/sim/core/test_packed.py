@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A packed table is to kernels what the named tuple is to Python: names, numbers and arrays."""
 
-from __future__ import annotations
-
 import gc
 from typing import Any, NamedTuple
 

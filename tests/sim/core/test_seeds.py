@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Streams of randomness and the dynamism curves."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Saved worlds are data: sizes and types are checked before anything is made of them."""
 
-from __future__ import annotations
-
 import json
 
 import numpy as np

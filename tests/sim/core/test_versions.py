@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """When the same seed gives another world, the version of the world goes up."""
 
-from __future__ import annotations
-
 import hashlib
 import json
 from pathlib import Path

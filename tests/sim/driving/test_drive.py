@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The driver reaches goals behind walls, keeps its distance, and gives up what it cannot reach."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Goals, rewards and steps of several scans: where goals lie, what is paid, what is refused."""
 
-from __future__ import annotations
-
 import math
 import re
 
@@ -98,15 +96,6 @@ def test_a_goal_that_cannot_be_reached_is_refused_with_one_that_can(scene):
         assert nearest is not None
         _, info = env.reset(seed=0, options={"goal": tuple(map(float, nearest.groups()))})
     assert info["goal"] is not None
-
-
-@pytest.mark.parametrize("scene", ["office", "apartment"])
-def test_the_goals_of_a_scene_can_be_reached(scene):
-    env = MobiliaEnv(scene)
-    env.reset(seed=0)
-    ground = Ground(env.simulation.world)
-    for goal in env.simulation.world.scene.goals.values():
-        ground.checked(goal)
 
 
 def ahead(reward: str, frame_skip: int = 1, speed: float = 1.0, steps: int = 200):

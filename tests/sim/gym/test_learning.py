@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rooms as a learner sees them: scans that nobody wants, and Stable-Baselines3."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

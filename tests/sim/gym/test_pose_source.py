@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Environments whose observation holds a believed pose: by whom it is asked, never the truth."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

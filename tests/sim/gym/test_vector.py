@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many rooms at once are the single rooms, bit for bit."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

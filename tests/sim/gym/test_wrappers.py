@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Wrappers: small observations, the same for one room and for many, and stacked by Gymnasium."""
 
-from __future__ import annotations
-
 import gymnasium
 import numpy as np
 import pytest

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The closed loop: only the estimate steers, truth only scores, whatever the SLAM does."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np
@@ -95,15 +93,6 @@ def test_truth_scores_and_does_nothing_else(monkeypatch):
     assert bytes_of(other) == bytes_of(run)
     assert other.goals[0].outcome == "wrong"
     assert other.lost_s is not None
-
-
-def test_the_seed_and_only_the_seed_decides_a_run():
-    def once(seed):
-        return drive(arena(seed, dynamism=0.5), create("odometry"), limit_s=4.0)
-
-    same, again, other = once(3), once(3), once(4)
-    assert bytes_of(same) == bytes_of(again)
-    assert bytes_of(same) != bytes_of(other)
 
 
 def test_every_slam_gets_the_same_goals_and_the_same_movers():

@@ -2,8 +2,6 @@
 """What a robot makes of its scans: thin things are wide at the foot, walls are walls, and what has
 left the view is remembered for a while."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

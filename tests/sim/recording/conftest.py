@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """One short episode, live and recorded."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recorded episode is what was seen live, for our reader and for those of others."""
 
-from __future__ import annotations
-
 import math
 import tracemalloc
 from collections import defaultdict

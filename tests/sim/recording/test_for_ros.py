@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What SLAM and navigation stacks of ROS need to run on a bag with their defaults."""
 
-from __future__ import annotations
-
 import json
 import math
 import os

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Recordings of every scanner are what was seen live: bags, CARMEN logs, recipes, episodes."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from pathlib import Path
@@ -12,7 +10,6 @@ import pytest
 
 from sim.moments import toured
 from sim.recording.bag import BagWriter
-from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe, write_recipe
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, stream
@@ -60,16 +57,6 @@ def test_a_carmen_log_gives_the_scans_back(tmp_path: Path, name: str) -> None:
         known = theirs.scan.valid
         np.testing.assert_array_equal(ours.scan.ranges[known], theirs.scan.ranges[known])
         np.testing.assert_allclose(ours.scan.spec.angles, theirs.scan.spec.angles, atol=1e-6)
-
-
-def test_an_episode_of_any_scanner_is_made_again_from_its_recipe(tmp_path: Path) -> None:
-    recipe = Recipe(scene="arena", seed=2, dynamism=1.0, seconds=0.5, scanner="utm30lx:noise")
-    (tmp_path / "again").mkdir()
-    first = record(recipe, tmp_path)[recipe.name]
-    made = read_recipe(tmp_path / recipe.name / RECIPE)
-    assert made.recipe == recipe
-    assert first["frames"] == 20
-    assert record(made.recipe, tmp_path / "again")[recipe.name] == first
 
 
 def test_a_recipe_takes_registered_names_only(tmp_path: Path) -> None:

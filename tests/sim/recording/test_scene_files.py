@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scene's files are part of a recipe by their hash: what was edited since is not simulated."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import pytest

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``rearranged.csv``: a row for each thing, as any reader of CSV has it; out is empty."""
 
-from __future__ import annotations
-
 import csv
 from pathlib import Path
 

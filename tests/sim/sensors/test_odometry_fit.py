@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fit finds how odometry errs, and draws errors of the same size."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

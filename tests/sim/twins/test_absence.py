@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A mover that is out leaves no trace, one that is frozen stays; everything else is as it was."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 import pytest

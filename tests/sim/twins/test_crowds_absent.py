@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Who holds something goes out with it; groups by one word; leaders that are out or frozen."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

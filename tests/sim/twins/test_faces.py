@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Faces of walls move to where returns lie; a wall that is askew turns."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

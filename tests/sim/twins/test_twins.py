@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Twins of one drive, and how many chairs move."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

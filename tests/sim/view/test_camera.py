@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """3-D pictures, where the machine can make them, and one clear line where it cannot."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 import sys

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The picture from above: where things are drawn, and that nothing else changes."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

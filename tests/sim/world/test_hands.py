@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Hands from outside: what they move moves as asked, and where they cannot they say why."""
 
-from __future__ import annotations
-
 import math
 
 import pytest

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot that is carried elsewhere, and a change that comes once."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Other robots: the scenes' own by name changes no byte; a car turns no tighter than it can."""
 
-from __future__ import annotations
-
 import copy
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Events at stated times: they happen then, to what they name, and the same way each time."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sessions of one building: as much changes between two of them as was asked for."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

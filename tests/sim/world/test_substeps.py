@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Physics from compiled code is MuJoCo's own, and many substeps at once are single ones."""
 
-from __future__ import annotations
-
 import mujoco
 import numpy as np
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The moving world: seeds, stillness, shoves, drive, saved states."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 
@@ -17,7 +15,6 @@ from sim.core.seeds import Seeds
 from sim.world.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.errors import InvalidValueError
-from tests.processes import python
 
 STILL = Dynamism.at(0)
 
@@ -40,49 +37,6 @@ def lively(seed: int | Seeds) -> World:
     return world
 
 
-PROGRAM = """
-import sys; sys.path.insert(0, {folder!r})
-from test_world import digest, lively, run
-print(digest(run(lively({seed}), 6.0)))
-"""
-
-
-def in_another_process(seed: int) -> str:
-    program = PROGRAM.format(folder=__file__.rsplit("/", 1)[0], seed=seed)
-    done = python("-c", program)
-    return done.stdout.strip()
-
-
-# -- seeds ----------------------------------------------------------------------------------
-
-
-def test_the_seed_and_only_the_seed_decides_a_run_in_any_process():
-    here = digest(run(lively(3), 6.0))
-    assert in_another_process(3) == here
-    assert digest(run(lively(4), 6.0)) != here
-
-
-def push_times(seeds: Seeds, **options: int) -> list[tuple[float, ...]]:
-    """Every change of every chair's schedule during 12 s."""
-    world = World("office", seed=seeds, dynamism=1.0, **options)
-    shoves, seen = world._shoves["chair"], []
-    for _ in range(12 * SUBSTEPS_PER_S):
-        world.substep()
-        row = tuple(shoves.schedule[:, 0].tolist())
-        if not seen or seen[-1] != row:
-            seen.append(row)
-    return seen
-
-
-def test_other_people_leave_the_shoves_of_chairs_alone():
-    plain = push_times(Seeds(2))
-    assert len(plain) > 3
-    assert push_times(Seeds(2, people=9)) == plain
-    assert push_times(Seeds(2, doors=9)) == plain
-    assert push_times(Seeds(2, chairs=9)) != plain
-    assert push_times(Seeds(2), n_people=1) == plain
-
-
 # -- stillness ------------------------------------------------------------------------------
 
 
@@ -94,28 +48,6 @@ def test_at_dynamism_zero_nothing_moves(scene):
     np.testing.assert_array_equal(world.mover_poses(), poses)
     np.testing.assert_array_equal(world.data.mocap_pos, limbs)
     assert not world.movers_moving().any()
-
-
-@pytest.mark.parametrize("scene", ["arena", "office"])
-def test_at_dynamism_one_much_moves(scene):
-    world = World(scene, seed=1, dynamism=1)
-    poses = world.mover_poses()
-    moved = np.zeros(len(poses), dtype=bool)
-    for _ in range(20):
-        run(world, 1.0)
-        moved |= world.movers_moving()
-    kinds = {m.kind for m, did in zip(world.scene.movers, moved, strict=True) if did}
-    expected = {"chair_swivel"} if scene == "arena" else {"chair_swivel", "person", "door"}
-    assert expected <= kinds
-
-
-def test_time_is_exact():
-    world = World("arena", dynamism=0, n_chairs=0)
-    stamps = []
-    for _ in range(7):
-        stamps.append(world.time_ns)
-        world.substep()
-    assert stamps == [round(k * 1e9 / 300) for k in range(7)]
 
 
 # -- chairs ---------------------------------------------------------------------------------

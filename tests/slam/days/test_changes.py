@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What changed between two sessions, on places laid out by hand, and what a session sees."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Habits of places: their mathematics by hand, and what they promise."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

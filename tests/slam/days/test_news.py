@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a scan shows that the days before did not know: what came, what went, and for how long."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

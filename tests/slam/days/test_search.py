@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where a session starts: one belief weighs all places; and whether what it saw fits the past."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A map from day to day: its start is found, what does not fit never touches it."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 

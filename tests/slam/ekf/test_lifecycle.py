@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What becomes a landmark, what goes, and what only hides."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole rival on known motion: static and moving points, corners of rooms, a synthetic park."""
 
-from __future__ import annotations
-
 import math
 import os
 import pickle

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run that agrees with itself, and one that does not."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

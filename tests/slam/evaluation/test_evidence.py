@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What stands: a wall that every scan hits; what is looked through later does not."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

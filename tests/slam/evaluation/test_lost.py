@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Lost is far off for long enough, found again near for as long; a divergence rises and stays."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

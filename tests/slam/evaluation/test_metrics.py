@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Metrics on trajectories whose errors are known by construction."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Poses with covariances stand in the file as written, in the robot's frame."""
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

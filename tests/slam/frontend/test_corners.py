@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Corners of a scan: where they truly are, with an honest covariance, and none that is not one."""
 
-from __future__ import annotations
-
 import math
 import sys
 from itertools import pairwise

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """De-skew against the exact arc, for the one rule that every user shares."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Streams that no robot made, motion over scans that are left out, and the bias that is learnt."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 import sys

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fast bearing is as near to the right one as those who decide by it assume."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

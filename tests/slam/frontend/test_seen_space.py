@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What was seen becomes free, what was not stays unknown, what is there stays there."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The sigma of ranges is the scanner's, and the config's number only where that states none."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

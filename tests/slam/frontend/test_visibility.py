@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Section 3.3: what a scan may clear, and what it must leave alone."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

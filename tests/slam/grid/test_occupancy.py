@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ordinary grid: log-odds apart from the seconds of looking that its covariance reads."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -5,8 +5,6 @@ Its arguments are the file with the truth, which none should know, and the proce
 Each attempt answers with what it got hold of, or raises ``OSError``. All are told in one error.
 """
 
-from __future__ import annotations
-
 import contextlib
 import ctypes
 import json

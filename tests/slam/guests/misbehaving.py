@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A SLAM behind the pipe that does, at its third scan, what its argument says. Not a test."""
 
-from __future__ import annotations
-
 import json
 import os
 import signal

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A program behind ``pipe:`` gets no truth, however it tries, where the kernel can keep it off."""
 
-from __future__ import annotations
-
 import ctypes
 import json
 import os

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever a guest starts ends with it, in whatever session, however mobilia itself ends."""
 
-from __future__ import annotations
-
 import os
 import signal
 import subprocess

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Guests speak the protocol, follow a known drive, and lose a run when they fail."""
 
-from __future__ import annotations
-
 import ctypes
 import importlib
 import os

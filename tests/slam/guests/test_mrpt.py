@@ -4,8 +4,6 @@
 A script stands in for the program, so that this needs none: it logs poses as MRPT does.
 """
 
-from __future__ import annotations
-
 import math
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A SLAM in a process of its own: heard exactly, judged by how it fails, never left behind."""
 
-from __future__ import annotations
-
 import gc
 import sys
 import time

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What goes over the pipe comes back the same, to the last bit; what is no answer is told apart."""
 
-from __future__ import annotations
-
 import json
 import math
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The EKF's compiled arithmetic against the same written with NumPy."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Gates and IPJC: the best of all hypotheses where theory says so, pairs that others miss."""
 
-from __future__ import annotations
-
 from itertools import product
 
 import numpy as np

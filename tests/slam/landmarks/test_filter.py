@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The EKF's mathematics: Jacobians by differences, covariances by sampling, known motion."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 

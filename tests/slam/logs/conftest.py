@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Real logs where there are some, and synthetic CARMEN logs written line by line."""
 
-from __future__ import annotations
-
 import math
 import os
 from collections.abc import Callable
@@ -33,7 +31,7 @@ def data_folder() -> Callable[[str], Path]:
 
 
 @pytest.fixture
-def carmen_text() -> CarmenText:
+def carmen_text() -> "CarmenText":
     """Makers of the lines of a CARMEN log."""
     return CarmenText()
 

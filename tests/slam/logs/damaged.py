@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Random damage to a log, the same on every run."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 from hypothesis import HealthCheck, settings

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Bags as other robots record them: sqlite3, MCAP or ROS 1, topics at their own rates."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 from pathlib import Path

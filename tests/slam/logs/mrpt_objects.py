@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Objects of MRPT rawlogs in every version of their layouts, after MRPT's sources."""
 
-from __future__ import annotations
-
 import math
 import struct
 from collections.abc import Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever number a log has, it ends in frames or in an error: file, line, field, value."""
 
-from __future__ import annotations
-
 import math
 import random
 import re

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Anybody's bag: topics at their own rates, scanners mounted anyhow, and every kind of damage."""
 
-from __future__ import annotations
-
 import logging
 import math
 from pathlib import Path

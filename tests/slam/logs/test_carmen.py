@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """CARMEN logs that are whole: poses, ranges, times and geometry come out as they went in."""
 
-from __future__ import annotations
-
 import lzma
 import math
 from itertools import pairwise

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Damaged CARMEN logs: a ``LogFormatError`` that names the file, never a plausible stream."""
 
-from __future__ import annotations
-
 import gzip
 import lzma
 import os

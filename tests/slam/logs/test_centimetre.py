@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Plain L/O logs in centimetres."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a scanner is mounted is found from its scans and what the robot drove between them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

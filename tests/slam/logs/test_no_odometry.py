@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scanner carried in the hand: bags without odometry run on a constant velocity, and say so."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """MRPT rawlogs: every version of their layouts, what MRPT's own programs write, and damage."""
 
-from __future__ import annotations
-
 import gzip
 import math
 import shutil

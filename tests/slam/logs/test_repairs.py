@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is usual in public logs is repaired, counted and said once; a strict reader refuses it."""
 
-from __future__ import annotations
-
 import lzma
 from itertools import pairwise
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Text logs read by a description of their columns."""
 
-from __future__ import annotations
-
 import math
 import re
 from pathlib import Path

@@ -4,8 +4,6 @@
 On Intel it is in ``tests/golden``, beside the digest of the same run.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from slam import create

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Small files that unpack to very much are refused before they fill the memory."""
 
-from __future__ import annotations
-
 import bz2
 import gzip
 import lzma

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Victoria Park reader on a synthetic park in the same formats; the real one where it is."""
 
-from __future__ import annotations
-
 import lzma
 import math
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Clocks whose times below 0 were written by 32 bits without a sign: 4294967295.75 s for -0.25."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Domains of their own, and clients in them."""
 
-from __future__ import annotations
-
 import os
 import subprocess
 from collections.abc import Iterator, Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes of other makes, built or found."""
 
-from __future__ import annotations
-
 import shutil
 import subprocess
 import sys

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A drive along a wall, as frames: what the network is tried with."""
 
-from __future__ import annotations
-
 from collections import defaultdict
 
 import numpy as np

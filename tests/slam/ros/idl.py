@@ -4,8 +4,6 @@
 python tests/slam/ros/idl.py sensor_msgs/msg/LaserScan > ros.idl
 """
 
-from __future__ import annotations
-
 import sys
 from collections.abc import Iterable
 from typing import Any

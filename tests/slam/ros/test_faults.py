@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What goes wrong between real processes, with nodes of other makes: what is said, what goes on."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import shutil

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an outside node says, and what is made of it: timely, late, silent, wrong, twice."""
 
-from __future__ import annotations
-
 import sys
 from pathlib import Path
 

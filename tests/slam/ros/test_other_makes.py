@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes of other makes: Fast DDS in C++ with types of its own generator, zenoh-ros2-sdk."""
 
-from __future__ import annotations
-
 import os
 import shlex
 import time

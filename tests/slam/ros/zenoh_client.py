@@ -6,8 +6,6 @@
 It takes the texts of message types from rosbags: the library would fetch them from the network.
 """
 
-from __future__ import annotations
-
 import os
 import re
 import struct

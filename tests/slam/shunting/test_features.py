@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Peaks between neurons, and the shunting SLAM on point features with IPJC."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

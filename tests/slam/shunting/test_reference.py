@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fast code with the preset ``paper`` against the paper in 150 lines of NumPy."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 from functools import cache
 from pathlib import Path

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a scan costs does not depend on what lies elsewhere, and what is silent costs nothing."""
 
-from __future__ import annotations
-
 from pathlib import Path
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The whole system on short drives through the flat test world."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Any

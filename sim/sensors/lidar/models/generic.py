@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scanner of no make: ``scanner(fov_deg=270, beams=541, rate_hz=20, sigma_m=0.01)``."""
 
-from __future__ import annotations
-
 from sim.core.checks import number, whole
 from sim.sensors.lidar.registry import register
 from sim.sensors.lidar.scanner import MAX_BEAMS, Band, Scanner

@@ -12,8 +12,6 @@ neighbouring beams of such a scan are one mirror turn apart in time: what a movi
 combed, and so it is here. A turn lasts 13.33 ms; the data sheet prints 13.32.
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field, fields, replace
 from types import MappingProxyType
 
@@ -69,7 +67,7 @@ class RangeEffects:
         check(self)
 
     @classmethod
-    def none(cls) -> RangeEffects:
+    def none(cls) -> "RangeEffects":
         """All off."""
         return cls(**{f.name: False for f in fields(cls) if f.name != "dropout_rate"})
 
@@ -131,7 +129,7 @@ class Lms221Config:
     @classmethod
     def ideal(
         cls, *, resolution_deg: float = 0.5, fov_deg: int = 180, range_mode: str = "80m"
-    ) -> Lms221Config:
+    ) -> "Lms221Config":
         """Geometry and timing of the device, exact ranges; inf where there is nothing."""
         own = cls(resolution_deg=resolution_deg, fov_deg=fov_deg, range_mode=range_mode)
         return own.only("ideal")
@@ -139,7 +137,7 @@ class Lms221Config:
     @classmethod
     def noise_only(
         cls, *, resolution_deg: float = 0.5, fov_deg: int = 180, range_mode: str = "80m"
-    ) -> Lms221Config:
+    ) -> "Lms221Config":
         """The 10 mm statistical error and the rounding to codes, no other effect."""
         own = cls(resolution_deg=resolution_deg, fov_deg=fov_deg, range_mode=range_mode)
         return own.only("noise")
@@ -202,7 +200,7 @@ class Lms221Config:
             dropout_rate=on.dropout_rate,
         )
 
-    def only(self, errors: str) -> Lms221Config:
+    def only(self, errors: str) -> "Lms221Config":
         """With the errors named in ``sim.sensors.lidar.scanner.ERRORS``."""
         one_of("errors", errors, ERRORS)
         bare = replace(self, effects=RangeEffects.none())

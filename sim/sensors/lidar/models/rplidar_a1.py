@@ -12,8 +12,6 @@ triangulation besides, where two surfaces under one spot do not mix as echoes do
 are simulated, as for every scanner, by their optics.
 """
 
-from __future__ import annotations
-
 import math
 
 from sim.sensors.lidar.registry import register

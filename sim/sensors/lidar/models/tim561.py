@@ -18,8 +18,6 @@ the mirror (starting angle and step count upwards, hence counter-clockwise). Pan
 simulated, as for every scanner, by their optics (inferred).
 """
 
-from __future__ import annotations
-
 from sim.sensors.lidar.registry import register
 from sim.sensors.lidar.scanner import Band, Scanner, disc
 from sim.sensors.lidar.sheet import NOT_STATED, Stated

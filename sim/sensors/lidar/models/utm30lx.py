@@ -11,8 +11,6 @@ UST-20LX is of another head). Panes and mirrors are, as for every scanner, by th
 (inferred).
 """
 
-from __future__ import annotations
-
 from sim.sensors.lidar.registry import register
 from sim.sensors.lidar.scanner import Band, Scanner
 from sim.sensors.lidar.sheet import NOT_STATED, Stated

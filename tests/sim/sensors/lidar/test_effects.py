@@ -1,19 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
 """Each effect of the range model by itself, against what the manufacturer says of it."""
 
-from __future__ import annotations
-
 import math
-from dataclasses import fields, replace
+from dataclasses import replace
 from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
 from sim.sensors.lidar.device import LaserScanner, ScanResult
-from sim.sensors.lidar.models.lms221 import LMS221_SPOT, NEEDED, Lms221Config, RangeEffects
-from sim.sensors.lidar.receiver import error_function, needed_reflectivity
-from sim.sensors.lidar.scanner import Band, Spot
+from sim.sensors.lidar.models.lms221 import Lms221Config, RangeEffects
+from sim.sensors.lidar.receiver import error_function
+from sim.sensors.lidar.scanner import Band
 from sim.sensors.lidar.surfaces import reflectivity_of
 from slam.errors import InvalidValueError
 
@@ -39,23 +37,6 @@ def test_no_effect_is_a_ruler(room: SimpleNamespace) -> None:
     result, _ = look(room, room.SQUARE)
     np.testing.assert_array_equal(result.ranges, result.true_ranges.astype(np.float32))
     assert not result.mixed.any()
-
-
-def test_the_spot_has_the_size_of_the_data_sheet() -> None:
-    """TL table 10-1: 3, 4, 6, 8, 12, 14, 26 cm at 1, 2, 3, 5, 8, 10, 20 m (rounded up there)."""
-    for range_m, size_cm in ((1, 3), (2, 4), (3, 6), (5, 8), (8, 12), (10, 14), (20, 26)):
-        diameter = 2.0 * (LMS221_SPOT.aperture + LMS221_SPOT.divergence * range_m)
-        assert 100.0 * diameter == pytest.approx(size_cm, abs=0.9)
-    assert len(LMS221_SPOT.offsets) == 7
-    assert all(u * u + v * v <= 1.0 for u, v in LMS221_SPOT.offsets)
-    assert Spot().offsets == ((0.0, 0.0),)
-
-
-def test_the_needed_reflectivity_is_the_printed_curve() -> None:
-    for range_m, needed in NEEDED:
-        assert needed_reflectivity(NEEDED, range_m) == pytest.approx(needed, rel=1e-9)
-    assert needed_reflectivity(NEEDED, 0.1) > 1.0
-    assert needed_reflectivity(NEEDED, 80.0) > needed_reflectivity(NEEDED, 60.0)
 
 
 def test_black_rubber_vanishes_close_by_and_far_away(room: SimpleNamespace) -> None:
@@ -183,21 +164,6 @@ def test_no_return_is_an_error_code_as_the_driver_has_it(room: SimpleNamespace) 
         assert np.isnan(result.ranges[0]) == error_codes
 
 
-def test_paint_on_the_floor_is_not_seen(room: SimpleNamespace) -> None:
-    world = room.wall(2.1, 0, 0.1, 1, 'group="5"') + room.wall(3.1, 0, 0.1, 1, 'group="1"')
-    result, _ = look(room, world)
-    assert result.ranges[180] == pytest.approx(2.98)
-
-
-def test_every_effect_is_on_unless_told_otherwise() -> None:
-    assert Lms221Config().effects == RangeEffects()
-    assert all(getattr(RangeEffects(), f.name) for f in fields(RangeEffects)[:-1])
-    assert Lms221Config.ideal().effects == NONE
-    assert Lms221Config.ideal().noise_std_m == 0.0
-    assert Lms221Config.noise_only().effects == NONE
-    assert Lms221Config.noise_only().noise_std_m == 0.010
-
-
 def test_the_systematic_error_is_smooth_bounded_and_of_the_unit(room: SimpleNamespace) -> None:
     """TD p34, over 20 units, black to white."""
     curves = []
@@ -216,11 +182,6 @@ def test_the_systematic_error_is_smooth_bounded_and_of_the_unit(room: SimpleName
         error = result.ranges - result.true_ranges
         assert 0.0 < np.abs(error).max() <= 0.05
     assert not np.array_equal(first.ranges, second.ranges)
-
-
-def test_centimetre_mode_has_the_larger_bound() -> None:
-    assert Lms221Config(range_mode="32m").systematic_bound_m == 0.035
-    assert Lms221Config(range_mode="80m").systematic_bound_m == 0.05
 
 
 def test_lost_values_are_error_codes(room: SimpleNamespace) -> None:

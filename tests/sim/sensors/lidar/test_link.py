@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Messages per mirror turn as the ROS driver makes them; the serial link's printed losses."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 
@@ -14,19 +12,6 @@ from slam.errors import InvalidValueError
 
 def link(baud: int, resolution: float, fov: int = 180) -> SerialLink:
     return SerialLink(baud=baud, config=Lms221Config(resolution_deg=resolution, fov_deg=fov))
-
-
-@pytest.mark.parametrize(
-    ("baud", "quarter", "half", "whole"),
-    # TL table 10-17, best case; 19.2 kBd inferred.
-    [(9_600, 16, 29, 30), (19_200, 8, 15, 15), (38_400, 4, 8, 8), (500_000, 0, 0, 0)],
-)
-def test_lost_scans_are_those_of_the_telegram_listing(
-    baud: int, quarter: int, half: int, whole: int
-) -> None:
-    assert link(baud, 0.25, 100).lost_scans == quarter
-    assert link(baud, 0.5).lost_scans == half
-    assert link(baud, 1.0).lost_scans == whole
 
 
 def test_rates_and_ages_at_arrival() -> None:
@@ -42,12 +27,6 @@ def test_rates_and_ages_at_arrival() -> None:
     oldest = quarter.latency_ns + quarter.config.stamp_offset_ns
     assert oldest == pytest.approx(80.0e6, abs=0.2e6)
     assert link(38_400, 0.5).latency_ns == pytest.approx((26.67 + 190.6) * 1e6, abs=0.1e6)
-
-
-def test_every_ninth_scan_is_sent_at_38400_baud() -> None:
-    slow, fast = link(38_400, 0.5), link(500_000, 0.5)
-    assert [k for k in range(30) if slow.sends(k)] == [0, 9, 18, 27]
-    assert all(fast.sends(k) for k in range(30))
 
 
 def test_a_slow_line_loses_scans_but_no_odometry() -> None:

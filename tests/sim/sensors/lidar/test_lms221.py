@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The LMS-221 against its data sheet, and its timing against closed forms."""
 
-from __future__ import annotations
-
 import math
 from types import SimpleNamespace
 
@@ -27,30 +25,6 @@ def scan(
     model, data = room.build(room.SQUARE if world is None else world)
     lidar = LaserScanner(model, config, np.random.default_rng(seed))
     return lidar.observe(room.stepper(model, data, twist), data), lidar
-
-
-@pytest.mark.parametrize(
-    ("resolution", "fov", "beams", "rate"),
-    [  # TD p10, TL p19, p47-48
-        (1.0, 180, 181, 75.0),
-        (0.5, 180, 361, 37.5),
-        (0.25, 180, 721, 18.75),
-        (1.0, 100, 101, 75.0),
-        (0.5, 100, 201, 37.5),
-        (0.25, 100, 401, 18.75),
-    ],
-)
-def test_beams_and_rates_are_those_of_the_data_sheet(
-    resolution: float, fov: int, beams: int, rate: float
-) -> None:
-    config = Lms221Config(resolution_deg=resolution, fov_deg=fov)
-    spec = config.spec()
-    assert spec.n_beams == beams
-    assert config.rate_hz == pytest.approx(rate)
-    assert math.degrees(spec.angle_min) == pytest.approx(-fov / 2)
-    assert math.degrees(spec.angles[-1]) == pytest.approx(fov / 2)
-    assert spec.beam_time_offsets[0] == 0.0
-    assert spec.sweep_duration <= (config.turns - 0.5) / 75.0 + 1e-9
 
 
 def test_half_degree_beams_come_from_the_second_turn() -> None:

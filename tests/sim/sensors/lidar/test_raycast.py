@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The caster against MuJoCo's own rays, and what it must refuse."""
 
-from __future__ import annotations
-
 import math
 
 import mujoco

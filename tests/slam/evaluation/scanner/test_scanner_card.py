@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scans of a made room with known errors: the card gives back what was put in, no more, no less."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from itertools import count

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What appeared and what is gone, told by the two memories; what stayed is neither."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Eq. (8) against closed forms: equilibria, times, bounds, shape, visibility."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections 3.1 and 3.2 on real updates: energy, fixed points, times, the four characteristics."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np
