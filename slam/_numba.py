@@ -98,7 +98,7 @@ def _callers_first(library: Any) -> list[Any]:
 _fitted: dict[Any, tuple[Any, bool]] = {}
 _Function: Any = functions.BaseFunction
 _explained = _Function.get_call_type  # tries all, and says why none of them fits
-_plain = vars(functions)["_unlit_non_poison"]  # a type without the value of a constant
+_plain: Any = vars(functions).get("_unlit_non_poison")  # a type without the value of a constant
 
 
 def _call_type(self: Any, context: Any, args: Any, kws: Any) -> Any:
