@@ -167,19 +167,38 @@ class _SayOnce(event.Listener):  # type: ignore[misc]  # numba has no types
         pass
 
 
+class _Uncollected(event.Listener):  # type: ignore[misc]  # numba has no types
+    """Lets the collector of cyclic garbage rest while anything is compiled.
+
+    A compiler makes millions of objects and few cycles, and looking through them takes a tenth of
+    its time.
+    """
+
+    def __init__(self) -> None:
+        self.depth = 0
+        self.collected = False
+
+    def on_start(self, event: Any) -> None:
+        if self.depth == 0:
+            self.collected = gc.isenabled()
+            gc.disable()
+        self.depth += 1
+
+    def on_end(self, event: Any) -> None:
+        self.depth -= 1
+        if self.depth == 0 and self.collected:
+            gc.enable()
+
+
+event.register(COMPILING, _Uncollected())
+
+
 @contextmanager
 def announced(what: str) -> Iterator[None]:
-    """Run the kernels of ``what`` for the first time in here.
-
-    The collector of cyclic garbage rests: a compiler makes millions of objects and few cycles, and
-    looking through them takes a tenth of its time.
-    """
-    listener, collected = _SayOnce(what), gc.isenabled()
+    """Run the kernels of ``what`` for the first time in here."""
+    listener = _SayOnce(what)
     event.register(COMPILING, listener)
-    gc.disable()
     try:
         yield
     finally:
-        if collected:
-            gc.enable()
         event.unregister(COMPILING, listener)

@@ -12,8 +12,9 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
+from numba.core import event
 
-from slam._jit import announced, inner, uncounted
+from slam._jit import COMPILING, announced, inner, uncounted
 
 CALLEE = """
 from slam._jit import {} as jit
@@ -107,7 +108,6 @@ def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptu
 
     with caplog.at_level(logging.INFO, logger="slam._jit"):
         with announced("the test's kernel"):
-            assert not gc.isenabled()
             assert twice(2) == 4
             assert twice(0.5) == 1.0  # compiled again, for another type
         assert [r.message for r in caplog.records] == [
@@ -116,14 +116,41 @@ def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptu
         with announced("the test's kernel"):
             twice(3)
         assert len(caplog.records) == 1
-    assert gc.isenabled()
 
 
-def test_the_collector_is_left_as_it_was_whatever_happens() -> None:
-    gc.disable()
+@pytest.mark.parametrize("collected", [False, True])
+def test_the_collector_rests_while_a_kernel_compiles_and_is_left_as_it_was(collected: bool) -> None:
+    resting = []
+
+    class Look(event.Listener):
+        def on_start(self, event: object) -> None:
+            resting.append(not gc.isenabled())
+
+        def on_end(self, event: object) -> None: ...
+
+    was = gc.isenabled()
+    (gc.enable if collected else gc.disable)()
     try:
-        with pytest.raises(ZeroDivisionError), announced("nothing"):
-            raise ZeroDivisionError
-        assert not gc.isenabled()
+        with event.install_listener(COMPILING, Look()):
+            assert numba.njit(lambda x: x + 1)(1) == 2
+            with pytest.raises(numba.core.errors.TypingError):
+                numba.njit(lambda x: x.nothing)(1)
+        assert resting
+        assert all(resting)
+        assert gc.isenabled() is collected
     finally:
-        gc.enable()
+        (gc.enable if was else gc.disable)()
+
+
+def test_an_implementation_that_fitted_other_types_is_not_taken_for_these() -> None:
+    @numba.njit
+    def summed(x, y):
+        return x + y
+
+    assert summed(1, 2) == 3
+    assert summed(1.5, 2) == 3.5
+    assert summed("a", "b") == "ab"
+    assert (summed(np.ones(2), 1) == 2.0).all()
+    for _ in range(2):
+        with pytest.raises(numba.core.errors.TypingError, match="No implementation of function"):
+            summed(1, "b")

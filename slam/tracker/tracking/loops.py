@@ -27,7 +27,7 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.tracking.anchors import map_errors
-from slam.tracker.tracking.closures import DRAWN, Closures
+from slam.tracker.tracking.closures import Closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.merging import LEFT, MOST_KEYS, Merge
 from slam.tracker.tracking.passages import Passages
@@ -173,8 +173,7 @@ class Loops(KeyFrames):
         if self._redrawing is not None and self._redrawing.outrun:
             self._redrawing, self._new_graph = None, True
         if self._redrawing is not None and not self._redrawing.done:
-            self._redrawing.draw()
-            return DRAWN
+            return self._redrawing.draw()
         if self._relaxation is not None:
             return self._relax(self._relaxation)
         self.closures.spent = 0
