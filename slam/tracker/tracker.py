@@ -205,7 +205,7 @@ class Tracker(abc.ABC):
         agreement, dragged = self._standing.agreement, 0.0
         if match.slipped:  # found by a search, among what does not fit there
             found = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
-            self._pose_covariance.displaced(found)
+            self._pose_covariance.dragged(found)
         else:
             dragged = agreement.dragged(observations.mean_vote)
             left_behind = agreement.left_behind(dragged)

@@ -32,8 +32,8 @@ def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     out[2, 0], out[2, 1], out[2, 2] = ac / det, bc / det, cc / det
 
 
-@njit
-def sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+@inner
+def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """out = f p f' for a symmetric (3, 3) p, exactly symmetric."""
     half = np.zeros((3, 3))
     for i in range(3):
@@ -84,7 +84,7 @@ def observable(
     T[0, 1] = T[1, 0] = c * s * (keep[0] - keep[1])
     T[1, 1] = s * s * keep[0] + c * c * keep[1]
     T[2, 2] = 1.0
-    sandwich(T, geometry, out)
+    _sandwich(T, geometry, out)
     return lost, math.atan2(c, -s)
 
 
@@ -137,12 +137,12 @@ def advance(  # noqa: C901, PLR0913 (kernel)
     F[0, 0] = F[1, 1] = F[2, 2] = 1.0
     F[0, 2], F[1, 2] = -motion[1], motion[0]
     precision, M, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    sandwich(F, drift, moved)
+    _sandwich(F, drift, moved)
     for i in range(3):
         for j in range(3):
             drift[i, j] = moved[i, j]
     # odometry's: what the data leave of it
-    sandwich(F, blind, moved)
+    _sandwich(F, blind, moved)
     whole = _sum(moved, 1.0, prior)
     _inverse(whole, precision)
     _inverse(_sum(data, 1.0, precision), M)
@@ -150,20 +150,20 @@ def advance(  # noqa: C901, PLR0913 (kernel)
         for j in range(3):
             N[i, j] = M[i, 0] * precision[0, j] + M[i, 1] * precision[1, j]
             N[i, j] += M[i, 2] * precision[2, j]
-    sandwich(N, whole, blind)
+    _sandwich(N, whole, blind)
     kept = np.empty((3, 3))
     for i in range(3):
         for j in range(3):
             N[i, j] = (1.0 if i == j else 0.0) - N[i, j]
-    sandwich(N, moved, kept)
-    sandwich(written, kept, moved)
+    _sandwich(N, moved, kept)
+    _sandwich(written, kept, moved)
     for i in range(3):
         for j in range(3):
             kept[i, j] = moved[i, j]
     _inverse(prior, precision)
     # the shared error, as far as the data decide over the time that it stays the same
     _inverse(_sum(data, 1.0 / variances[2], precision), M)
-    sandwich(M, data, moved)
+    _sandwich(M, data, moved)
     for i in range(3):
         for j in range(3):
             turns = (variances[3] if i == 2 else 1.0) * (variances[3] if j == 2 else 1.0)
@@ -188,7 +188,7 @@ def carried(
     T[0, 0], T[0, 1], T[1, 0], T[1, 1], T[2, 2] = 1.0 - x * x, -x * y, -x * y, 1.0 - y * y, 1.0
     for i in range(2):
         T[i, 2] = T[i, 1] * motion[0] - T[i, 0] * motion[1]
-    sandwich(T, covariance, out)
+    _sandwich(T, covariance, out)
 
 
 @njit

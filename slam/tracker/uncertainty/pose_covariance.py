@@ -24,13 +24,7 @@ from slam.frames import Float
 from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
-from slam.tracker.uncertainty.covariances import (
-    advance,
-    carried,
-    observable,
-    root_share,
-    sandwich,
-)
+from slam.tracker.uncertainty.covariances import advance, carried, observable, root_share
 from slam.tracker.uncertainty.residuals import Evidence
 
 
@@ -67,7 +61,6 @@ class PoseCovariance:
         self._blind: Float = np.zeros((3, 3))
         self._shared: Float = np.zeros((3, 3))
         self._by_movers: Float = np.zeros((3, 3))
-        self._written: Float = np.eye(3)  # root of the share of the latest scan that was new
         self.by_movers_m = 0.0
         self.loaded: Float | None = None
 
@@ -126,7 +119,6 @@ class PoseCovariance:
             xx, xy, yy = self._new_geometry
             root_share((xx, xy, yy), self._geometry, config.written, written)
             written[2, 2] = math.sqrt(min(config.written * new, 1.0))
-        self._written = np.eye(3) if evidence is None else written
         if strength > 0.0 and self._weighed > config.forgotten:
             feigned = self._feigned / self._weighed
             geometry = self._geometry * (1.0 / self._weighed)
@@ -163,25 +155,18 @@ class PoseCovariance:
         )
         self.covariance = self._drift + self._blind + self._shared
 
-    def displaced(self, covariance: Float) -> None:
-        """Map and robot are off by ``covariance`` (3, 3) more."""
+    def dragged(self, covariance: Float, now: Float | None = None) -> None:
+        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot.
+
+        ``now``: (3, 3) that the pose alone is off by more, until the next frame.
+        """
         self._drift = self._drift + covariance
         self.newest_drift = self.newest_drift + covariance
         self.covariance = self.covariance + covariance
         self._by_movers = self._by_movers + covariance
-        self.by_movers_m = _far(self._by_movers)
-
-    def dragged(self, left_behind: Float, now: Float) -> None:
-        """Movers may have carried the robot, by ``now`` (3, 3) until the next frame.
-
-        Of ``left_behind`` (3, 3) stays in the map the share that the scan shows for the first time:
-        what stood there before says where the robot is.
-        """
-        stays = np.empty((3, 3))
-        sandwich(self._written, left_behind, stays)
-        self.displaced(stays)
-        self.covariance = self.covariance + now
-        self.by_movers_m = _far(self._by_movers + now)
+        if now is not None:
+            self.covariance = self.covariance + now
+        self.by_movers_m = _far(self._by_movers if now is None else self._by_movers + now)
 
     def p_off(self, alert_m: float) -> float:
         """Probability that movers carried map and robot off by more than ``alert_m`` (Rayleigh)."""

@@ -389,33 +389,14 @@ def test_what_movers_carried_off_adds_up_until_a_loop_or_another_place_says_bett
     # the newest part is of the pose alone, and is not kept
     assert pose.by_movers_m == pytest.approx(0.05 * math.sqrt(4.5))
     pose.known(np.diag([0.0018, 0.0032, 0.0]))
-    pose.displaced(np.zeros((3, 3)))
+    pose.dragged(np.zeros((3, 3)))
     assert pose.by_movers_m == pytest.approx(0.05 * math.sqrt(2.0))
     pose.known(np.eye(3))  # a loop that says less
-    pose.displaced(np.zeros((3, 3)))
+    pose.dragged(np.zeros((3, 3)))
     assert pose.by_movers_m == pytest.approx(0.05 * math.sqrt(2.0))
     pose.relocated(np.eye(3))
-    pose.displaced(np.zeros((3, 3)))
+    pose.dragged(np.zeros((3, 3)))
     assert pose.by_movers_m == 0.0
-
-
-def test_of_what_movers_carried_off_stays_the_share_of_the_map_that_is_new() -> None:
-    geometry, part, none = np.diag([0.5, 0.5, 4.0]), np.diag([0.01, 0.0, 0.0]), np.zeros((3, 3))
-    still, match = moved(0.002, 0.002, 0.001), matched(1e5 * geometry)
-    kept = {}
-    for new in (0.0, 0.1, 1.0):
-        pose = PoseCovariance(CONFIG)
-        for _ in range(50):
-            there = np.array([new * 20.0 * 0.5, 0.0, new * 20.0 * 0.5])  # of the geometry, new
-            pose.update(ZERO, still, match, seen(geometry, new=20.0 * new, new_geometry=there))
-        pose.dragged(part, none)
-        kept[new] = pose.by_movers_m**2
-    assert kept[0.0] == 0.0
-    assert kept[0.1] == pytest.approx(CONFIG.uncertainty.pose.written * 0.1 * 0.01, rel=0.02)
-    assert kept[1.0] == pytest.approx(0.01)
-    pose.update(ZERO, still, match, None)  # by odometry alone: all of it
-    pose.dragged(part, none)
-    assert pose.by_movers_m**2 == pytest.approx(0.02)
 
 
 def test_a_pose_that_movers_may_have_carried_beyond_the_alert_limit_is_not_believed() -> None:
@@ -423,9 +404,9 @@ def test_a_pose_that_movers_may_have_carried_beyond_the_alert_limit_is_not_belie
     system, limit_m = ShuntingSlam(CONFIG), CONFIG.standing.alert_m
     for frame in stream[:-2]:
         assert system.update(frame.without_truth()).converged
-    system._pose_covariance.displaced(np.diag([(limit_m / 3.1) ** 2, 0.0, 0.0]))
+    system._pose_covariance.dragged(np.diag([(limit_m / 3.1) ** 2, 0.0, 0.0]))
     assert system.update(stream[-2].without_truth()).converged
-    system._pose_covariance.displaced(np.diag([limit_m**2, 0.0, 0.0]))
+    system._pose_covariance.dragged(np.diag([limit_m**2, 0.0, 0.0]))
     said = system.update(stream[-1].without_truth())
     assert not said.converged
     of_gaussian = math.exp(-1.0 / (1.0 + 3.1**-2))  # Rayleigh, beyond the limit
