@@ -30,7 +30,7 @@ LEAST_SCALE = 2.25  # least factor on a stated variance: else the map drifts unn
 LEAST_M, LEAST_RAD = 0.004, 0.003  # least deviation for the matcher, after FLOOR_S
 # deviations where none is stated: m/m, m/rad, rad/sqrt(m), rad/rad
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
-SLIP = 12.0  # squared innovation of x, y and heading above which wheels slip: 3.5 sigma
+SLIP = 12.0  # squared innovation of three numbers that noise exceeds in 0.7 %; set by hand
 LEAST_VARIANCE = 1e-12  # m^2 and rad^2, added so that none is zero: (1 um)^2, (1 urad)^2
 TWIST_S = 0.5  # s, longest odometry step that gives a twist
 

@@ -212,6 +212,8 @@ class Tracker(abc.ABC):
             self._pose_covariance.dragged(left_behind, agreement.covariance(dragged))
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
             self._odometry_noise.note_slip(prediction, match)
+        else:
+            self._odometry_noise.forget_slip()
         if judged.state is State.TRACKING and not match.slipped:
             sigma_m, along_rad = observations.sensor_sigma_m, self._pose_covariance.along_rad
             self._odometry_noise.learn(prediction, match, sigma_m, along_rad)
@@ -238,7 +240,8 @@ class Tracker(abc.ABC):
         everyone = observations.with_votes(None)
         self._loops.add(
             len(self._path), match.T_map_robot, motion, covariance, everyone,
-            elapsed=prediction.elapsed, written=state is State.TRACKING, found=found,
+            elapsed=prediction.elapsed, found=found,
+            written=state is State.TRACKING or (found and judged.writes),
         )  # fmt: skip
 
     def _report(

@@ -24,6 +24,7 @@ from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import innovation
 
 SLIP_S = 0.2  # s that a slip lasts in the mean; set by hand: station, 0.6 rad in 0.6 s
+SLIP_STEP_S = 0.15  # s, longest step: slower scans see no slip twice
 
 
 def _across(covariance: Float, across: tuple[float, float]) -> float:
@@ -106,11 +107,17 @@ class OdometryNoise:
 
     def note_slip(self, prediction: Prediction, match: Match) -> None:
         """Ask it of a match, to the map or to a local copy."""
-        slipped, found = self._slips, match.tau > 0.0 and prediction.elapsed <= SLIP_S
-        self._slips = found and prediction.is_slip(match.T_map_robot)
+        if match.tau == 0.0 or prediction.elapsed > SLIP_STEP_S:
+            self.forget_slip()
+            return
+        slipped, self._slips = self._slips, prediction.is_slip(match.T_map_robot)
         if slipped and self._slips:
             off = prediction.off(match.T_map_robot)
             self._slip = self._slip + np.multiply.outer(off, off)
+
+    def forget_slip(self) -> None:
+        """The robot was not matched where its motion led."""
+        self._slips, self._slip = False, np.zeros((3, 3))
 
     def learn(
         self,

@@ -75,6 +75,7 @@ def test_a_program_that_changed_is_run_again(tmp_path: Path):
     (program := tmp_path / "mine.py").write_text("")
     assert source_of(f"pipe:python3 {program} --fast") == (program,)
     assert source_of("tests.slam.guests.misbehaving:Any") == (Path(misbehaving.__file__),)
+    assert source_of("oracle(tests.slam.guests.misbehaving:Any)") == (Path(misbehaving.__file__),)
     assert source_of("shunting") == ()
 
 

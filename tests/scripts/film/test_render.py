@@ -13,7 +13,7 @@ from PIL import Image
 from typer.testing import CliRunner
 
 from scripts.cli import app
-from scripts.film.encode import size_of
+from scripts.film.encode import FILM_S, Pace, size_of
 from scripts.film.footage import of_scene, open_run
 from scripts.film.map_pane import RobotScan
 from scripts.film.panes import Layout
@@ -32,6 +32,11 @@ from slam.logs.carmen import write_carmen
 from tests.pictures import pictures_at
 
 SETTINGS = {"scene": "arena", "seconds": 2.0, "dynamism": 1.0, "seed": 3}
+
+
+def test_a_pace_shows_a_long_run_within_a_minute():
+    assert Pace.within_a_minute(20.0).speed == 1.0
+    assert Pace.within_a_minute(10.0 * FILM_S).speed == 10.0
 
 
 @pytest.fixture

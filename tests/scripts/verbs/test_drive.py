@@ -27,6 +27,13 @@ def read(path):
         return list(csv.DictReader(file))
 
 
+def test_a_run_depends_on_what_drives_it_and_not_on_tables():
+    ((_, job),) = plan().jobs()
+    names = {path.name for path in job.code}
+    assert {"slam", "sim", "scenes", "runs.py"} <= names
+    assert not {"plan.py", "tables.py", "pictures.py", "film.py"} & names
+
+
 def test_a_killed_call_goes_on_and_ends_with_the_same_bytes(tmp_path):
     wanted = plan(seeds=(100, 101))
     carry_out(wanted, tmp_path / "out")

@@ -65,6 +65,18 @@ def test_a_rare_large_correction_among_returns_of_weight_is_odometrys_own() -> N
     assert max(usual) < NUMBERS.disagreed
 
 
+def test_while_wheels_slip_corrections_are_no_sign_of_movers() -> None:
+    agreement, pull = Agreement(NUMBERS), np.tile([20.0 * SIGMA[0], 0.0, 0.0], (10, 1))
+    for off in pull:
+        prediction = Prediction(
+            T_map_robot=np.zeros(3), increment=np.zeros(3), covariance=np.diag(SIGMA**2),
+            twist=np.zeros(3), elapsed=STEP_S, slips=True,
+        )  # fmt: skip
+        agreement.take(prediction, off, 0.0)
+    assert agreement.ratio == 0.0
+    assert fed(pull).ratio > NUMBERS.disagreed
+
+
 def test_a_steady_drift_disagrees_also_among_returns_of_weight() -> None:
     assert fed(np.tile([0.5 * SIGMA[0], 0.0, 0.0], (200, 1)), vote=0.9).ratio > NUMBERS.disagreed
 
