@@ -5,8 +5,6 @@ A mover of a crowd is called after its part in it and a number, ``escort3``, ``b
 the words of ``scenes.crowd`` name all of a kind: ``escorts``, ``boards`` with those who push them.
 """
 
-from __future__ import annotations
-
 import re
 from collections.abc import Iterable, Sequence
 from fnmatch import fnmatchcase
@@ -30,13 +28,13 @@ _ROOM = {
 }  # fmt: skip
 
 
-def group_of(mover: Mover) -> str:
+def group_of(mover: "Mover") -> str:
     """The word for those it belongs to; "robot" for the robot."""
     part = re.sub(r"\d+$", "", mover.name)
     return _CROWD.get(part, _ROOM[mover.group])
 
 
-def groups_of(movers: Iterable[Mover]) -> dict[str, tuple[str, ...]]:
+def groups_of(movers: "Iterable[Mover]") -> dict[str, tuple[str, ...]]:
     """Names by group, in the order of the movers; without the robot."""
     found: dict[str, list[str]] = {}
     for mover in movers:
@@ -45,7 +43,7 @@ def groups_of(movers: Iterable[Mover]) -> dict[str, tuple[str, ...]]:
     return {group: tuple(names) for group, names in found.items()}
 
 
-def named(movers: Sequence[Mover], word: str) -> tuple[str, ...]:
+def named(movers: "Sequence[Mover]", word: str) -> tuple[str, ...]:
     """Who is meant: a mover's name, a group or a pattern of names, ``group[0-3]``, ``escort*``.
 
     Raises ``UnknownNameError`` where it is nobody.
@@ -63,7 +61,7 @@ def named(movers: Sequence[Mover], word: str) -> tuple[str, ...]:
     return found
 
 
-def with_held(holds: Sequence[Hold], names: Sequence[str]) -> tuple[str, ...]:
+def with_held(holds: "Sequence[Hold]", names: Sequence[str]) -> tuple[str, ...]:
     """These, and whatever they hold, and what that draws after it."""
     found = list(names)
     for name in found:  # grows while it is gone through

@@ -4,8 +4,6 @@
 A plan with another mark, or with too few words in one, is refused: it would be left out silently.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Collection, Iterable, Sequence
 from dataclasses import dataclass
@@ -43,7 +41,7 @@ class Mark:
     """A site of a plan: ``words`` of its name split at ':', where it is, half sizes of its box."""
 
     words: tuple[str, ...]
-    pose: Pose
+    pose: "Pose"
     half: tuple[float, float]
 
     @property

@@ -4,8 +4,6 @@
 ``random-rooms`` is a recipe in Python: it draws its plan.
 """
 
-from __future__ import annotations
-
 import tomllib
 from collections.abc import Callable
 from inspect import Parameter, Signature
@@ -22,13 +20,13 @@ WALLS = ("visible", "none")
 _USUAL = {"walls": WALLS[0], "glass": False, "doors": "open"}
 
 
-def recipe(name: str) -> Callable[..., Scene]:
+def recipe(name: str) -> "Callable[..., Scene]":
     """The recipe ``(seed, *, options) -> Scene`` of a row."""
     row = ROWS[name]
     counts = {key: n for key, n in row.items() if key.startswith("n_")}
     known = {**dict.fromkeys(counts), **{key: _USUAL[key] for key in _USUAL if key in row}}
 
-    def made(seed: int, **given: Any) -> Scene:
+    def made(seed: int, **given: Any) -> "Scene":
         return _filled(name, seed, {**known, **given})
 
     options = [Parameter(key, Parameter.KEYWORD_ONLY, default=known[key]) for key in known]
@@ -39,7 +37,7 @@ def recipe(name: str) -> Callable[..., Scene]:
     return made
 
 
-def _filled(name: str, seed: int, options: dict[str, Any]) -> Scene:
+def _filled(name: str, seed: int, options: dict[str, Any]) -> "Scene":
     from scenes.recipe import Draws, count, finish, furnished, planned
     from slam.shaped import one_of, shaped
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes by name: ``build("office", seed=3, n_people=0)``."""
 
-from __future__ import annotations
-
 import importlib
 import inspect
 from collections.abc import Callable
@@ -58,7 +56,7 @@ def build(
     scan_height_m: float = SCAN_HEIGHT,
     crowd: str = "none",
     **options: Any,
-) -> Scene:
+) -> "Scene":
     """The scene of that name and seed; ``module:function`` names any recipe,
     and the path of a TOML or MJCF file the scene that it describes (``scenes.from_file``).
 

@@ -11,8 +11,6 @@ the values of the module constants that a kernel and its callees use, which may 
 (a tree of numbers, say).
 """
 
-from __future__ import annotations
-
 import gc
 import hashlib
 import logging

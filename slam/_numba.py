@@ -16,8 +16,6 @@ for the versions that it was tried with; others compile as they do by themselves
 longer.
 """
 
-from __future__ import annotations
-
 import ctypes
 import os
 from contextlib import chdir, nullcontext

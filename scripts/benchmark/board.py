@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The leaderboard: ``leaderboard.json``, ``.csv`` and ``.md``, and the sentence on top."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from collections.abc import Callable, Iterator, Mapping, Sequence

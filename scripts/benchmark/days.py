@@ -4,8 +4,6 @@
 ``python -m scripts.benchmark.days out/days --slam shunting kiss-icp --jobs 2`` makes it alone.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Mapping, Sequence

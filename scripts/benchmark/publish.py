@@ -6,8 +6,6 @@ the top of each track. The folder of ``scripts.benchmark.days`` goes to ``docs/r
 ``days.json`` and ``days.csv``; the section at the end of docs/leaderboard.md is made from it.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

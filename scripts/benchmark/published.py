@@ -8,8 +8,6 @@ Each recording is named by its digest, so that nothing is compared on other scan
     python -m scripts.benchmark.published out/top --run shunting --levels 1 --seeds 20
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterable, Mapping, Sequence

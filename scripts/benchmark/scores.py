@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """From the rows of runs to those of the leaderboard: one for each track and SLAM."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence

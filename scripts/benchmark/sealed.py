@@ -5,8 +5,6 @@ Who holds the board draws them and keeps the file. Who sends a SLAM sees the has
 file is published, anyone can run the SLAMs on its seeds, and see that they are the ones promised.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import os

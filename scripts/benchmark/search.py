@@ -7,8 +7,6 @@ oracles were lost. The cheapest question comes first: the oracles run only where
 Each run is a line of ``--out``; the same command goes on from there.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import sys

@@ -5,8 +5,6 @@ It names the recordings by their digests. So whoever merges it sees that the SLA
 scans of the others. Nothing in it is ever run: the SLAM's name is a word.
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re

@@ -5,8 +5,6 @@ A new track, or a new version of one, is one more table of ``tracks.toml``, whic
 no other, or is declared with ``register`` in a file of one's own (``mobilia --with``).
 """
 
-from __future__ import annotations
-
 import hashlib
 import json
 import re
@@ -105,7 +103,7 @@ class Track:
         """1 for the first."""
         return int(self.name.rpartition("-v")[2])
 
-    def later(self, **changes: Any) -> Track:
+    def later(self, **changes: Any) -> "Track":
         """The next version of it, with these fields changed."""
         name = f"{self.family}-v{self.version + 1}"
         return replace(self, **{"name": name, "counts": None, **changes})

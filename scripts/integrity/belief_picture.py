@@ -6,8 +6,6 @@ probabilities of where motion led, of places nearby, of places elsewhere, and of
 knows where; below is the true error of the pose. Streams are training seeds of the plane.
 """
 
-from __future__ import annotations
-
 import argparse
 import sys
 from collections.abc import Iterable, Sequence

@@ -10,8 +10,6 @@ done. ``--no-run`` sums up what is there. Writes ``docs/results/integrity.json``
 ``docs/integrity.md``. What is counted: ``counting``.
 """
 
-from __future__ import annotations
-
 import argparse
 import json
 import math

@@ -9,8 +9,6 @@ The words are those of the Stanford diagram of aviation, for each scan:
   hazardous    it does, and the error is beyond the alert limit of 0.5 m, whatever the covariance
 """
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from collections.abc import Mapping, Sequence
@@ -50,7 +48,7 @@ class Moments:
     told: Mask
 
     @classmethod
-    def of(cls, run: Judged) -> Moments:
+    def of(cls, run: Judged) -> "Moments":
         """Of a run with truth and covariances."""
         return cls(
             seconds=run.pairs.stamps_ns / NS_PER_S,
@@ -60,11 +58,11 @@ class Moments:
             told=run.is_told(),
         )
 
-    def since(self, k: int) -> Moments:
+    def since(self, k: int) -> "Moments":
         """Scan ``k`` and those after it."""
         return Moments(**{name: values[k:] for name, values in vars(self).items()})
 
-    def after_alert(self) -> Moments:
+    def after_alert(self) -> "Moments":
         """Without the first ``ALERT_S``, and the first scan at least."""
         late = np.flatnonzero(self.seconds - self.seconds[0] >= ALERT_S)
         return self.since(max(int(late[0]), 1) if len(late) else len(self.seconds))

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """How the robot drives through a building of the plane, and what its wheels say of it."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -10,8 +10,6 @@ those that other code has made are made anew. Writes ``docs/results/belief.json`
 ``docs/belief.md`` and ``docs/pictures/belief_reliability.png``. ``--no-test`` only fits.
 """
 
-from __future__ import annotations
-
 import argparse
 import math
 import sys

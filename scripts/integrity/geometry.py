@@ -4,8 +4,6 @@
 A segment is anything with x0, y0, x1, y1 at its places 0 to 3, a disc with x, y, radius, in m.
 """
 
-from __future__ import annotations
-
 import math
 
 from slam._jit import inner, njit

@@ -6,8 +6,6 @@ same building: at least 3 m or 90 degrees away, near a place that it has mapped.
 nothing of it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from dataclasses import replace

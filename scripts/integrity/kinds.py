@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What moves in a stream of the plane, and what the robot has to see it with: a table of kinds."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, field, fields, replace
 

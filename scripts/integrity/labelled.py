@@ -7,8 +7,6 @@ and from places a few metres beside that. The same is asked of a scan of another
 no place is right. Copies of the SLAM are pushed and carried, for what slips and breaks look like.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Iterator, Sequence

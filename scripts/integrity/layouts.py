@@ -5,8 +5,6 @@ A way is an edge between two nodes; the robot drives along edges only, and they 
 ``CLEAR_M`` from every wall (a test holds that).
 """
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What one case of a way to get lost comes to: one SLAM over one stream, carried or pushed."""
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Sequence

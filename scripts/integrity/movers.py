@@ -6,8 +6,6 @@ Every thing is a segment with a radius: nothing overlaps a wall, a pillar or ano
 stands elsewhere from then on. Each thing draws from a generator of its own.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -7,8 +7,6 @@ only errors are noise, the end of its range, and beams without return. One spec 
 bytes each time, whatever else was simulated before.
 """
 
-from __future__ import annotations
-
 import itertools
 import math
 from collections.abc import Iterator

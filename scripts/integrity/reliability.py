@@ -6,8 +6,6 @@ A scan: the SLAM says that its pose is right with 1 - ``p_lost``; it is where th
 place elsewhere, and carried to nobody knows where, which is right where none of the others is.
 """
 
-from __future__ import annotations
-
 import copy
 import math
 from collections.abc import Iterable, Sequence

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which streams weights are fitted on, and their labelled scans in files."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Sequence
 from dataclasses import asdict, dataclass, replace

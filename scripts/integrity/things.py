@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Chairs, boards and people of a stream: what they are, and how they look to a beam."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterator
 from typing import Any, NamedTuple

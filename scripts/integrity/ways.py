@@ -6,8 +6,6 @@ others the robot is carried or pushed ``EACH`` times, each time with a copy of t
 seen the stream so far. ``docs/integrity.md`` describes each way.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path

@@ -6,8 +6,6 @@ Of each scan one place of those that a search found is right, or none is: a cond
 same evidence, and each kind of scan counts alike. Intervals are of fits to resampled streams.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
@@ -49,7 +47,7 @@ class Places:
     stream: NDArray[np.int64]
 
     @classmethod
-    def of(cls, scans: Sequence[tuple[int, Sequence[tuple[float, float, bool]]]]) -> Places:
+    def of(cls, scans: Sequence[tuple[int, Sequence[tuple[float, float, bool]]]]) -> "Places":
         """Of (stream, places) of each scan."""
         width = max((len(places) for _, places in scans), default=0)
         table = np.full((len(scans), width, 3), np.nan)
@@ -75,7 +73,7 @@ class Scans:
     streams: int
 
     @classmethod
-    def of(cls, many: Sequence[Labelled]) -> Scans:
+    def of(cls, many: Sequence[Labelled]) -> "Scans":
         """Raises ``InvalidValueError`` where a kind of label is missing."""
         found = [(k, g) for k, one in enumerate(many) for g in one.found if any(p[2] for p in g)]
         none = [(k, group) for k, one in enumerate(many) for group in one.none]

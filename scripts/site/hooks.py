@@ -5,8 +5,6 @@ The pages in docs/ are read in the repository, too. So some things are written a
 there, and are changed here for the site alone.
 """
 
-from __future__ import annotations
-
 import posixpath
 import re
 import shutil
@@ -35,7 +33,7 @@ _VIDEO = (  # a click or Enter plays it; until then nothing covers the picture b
 )
 
 
-def on_files(files: Files, *, config: MkDocsConfig) -> Files:
+def on_files(files: "Files", *, config: "MkDocsConfig") -> "Files":
     """Add the pages that lie outside docs/, and one that lists the results files."""
     for name, page in OUTSIDE.items():
         text = (ROOT / name).read_text(encoding="utf-8")
@@ -50,7 +48,7 @@ def _results() -> str:
     return f"# Measured results\n\nThe files that the pages quote.\n\n{rows}"
 
 
-def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
+def on_page_markdown(markdown: str, *, page: "Page", config: "MkDocsConfig", files: "Files") -> str:
     """Links to files at the root, and to the folder of results, lead to their pages."""
     del config, files
     folder = posixpath.dirname(page.file.src_uri)
@@ -64,7 +62,7 @@ def on_page_markdown(markdown: str, *, page: Page, config: MkDocsConfig, files: 
     return _LINK.sub(at_root, markdown)
 
 
-def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files) -> str:
+def on_page_content(html: str, *, page: "Page", config: "MkDocsConfig", files: "Files") -> str:
     """A picture that links to a clip becomes the clip, with the picture until it is played; where
     there is a page to turn of the same, a link to it follows."""
     del config, files
@@ -79,7 +77,7 @@ def on_page_content(html: str, *, page: Page, config: MkDocsConfig, files: Files
     return _CLIP.sub(turned, html)
 
 
-def on_post_build(*, config: MkDocsConfig) -> None:
+def on_post_build(*, config: "MkDocsConfig") -> None:
     """Pages to turn, where ``scripts.site.replays`` has made them, go into the site."""
     if REPLAYS.is_dir():
         shutil.copytree(REPLAYS, Path(config.site_dir) / "replays", dirs_exist_ok=True)

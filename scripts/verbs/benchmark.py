@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia benchmark``: all tracks, every SLAM, one leaderboard."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -146,7 +144,7 @@ def _seal(path: Path, seeds: int | None) -> None:
     say(drawn.sha256)
 
 
-def _opened(path: Path, train: bool) -> SealedSeeds:
+def _opened(path: Path, train: bool) -> "SealedSeeds":
     from scripts.benchmark import sealed
 
     if train:
@@ -156,7 +154,7 @@ def _opened(path: Path, train: bool) -> SealedSeeds:
     return opened
 
 
-def _tell(board: Board, out: Path, spent_s: float) -> None:
+def _tell(board: "Board", out: Path, spent_s: float) -> None:
     from scripts.benchmark.board import lost_from_words
     from scripts.pages.page import Page, Part, command, publish
 
@@ -202,7 +200,7 @@ def _tell(board: Board, out: Path, spent_s: float) -> None:
     say(f"{escape(str(out))} ({spent_s:.0f} s)")
 
 
-def _places(board: Board) -> Table | None:
+def _places(board: "Board") -> Table | None:
     from scripts.benchmark.board import RANKED_HEADS
 
     rows = board.ranked()

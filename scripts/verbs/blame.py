@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia blame``: a counterfactual debugger."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
 
@@ -115,7 +113,7 @@ def _world(world: dict[str, Any], words: list[str], scanner: str) -> dict[str, A
     return settings if scanner == "full" else settings | {"laser": laser}
 
 
-def _tell(found: Inquest, folder: Path, run: Path | None) -> None:
+def _tell(found: "Inquest", folder: Path, run: Path | None) -> None:
     from scripts.debugger.words import FIXED, headline, table
     from scripts.pages.page import Page, Part, command, publish
 
@@ -143,5 +141,5 @@ def _tell(found: Inquest, folder: Path, run: Path | None) -> None:
     ))  # fmt: skip
 
 
-def _path_m(found: Inquest) -> float:
+def _path_m(found: "Inquest") -> float:
     return max((trial.path_m for trial in found.trials if not trial.failed), default=0.0)

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia compare``: which SLAM bears how much dynamism, on the same frames for everyone."""
 
-from __future__ import annotations
-
 import time
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -115,7 +113,7 @@ def compare(
     say(f"{escape(str(out))}: runs.csv, levels.csv, paired.csv, runs/{more} ({spent_s:.0f} s)")
 
 
-def tell(plan: Plan, rows: list[dict[str, Any]]) -> None:
+def tell(plan: "Plan", rows: list[dict[str, Any]]) -> None:
     """Print the table of each scene, who failed and where, and the answer about the first SLAM."""
     from scripts.comparison.make import median_errors
     from scripts.report.answer import answer, failed, standing

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia config``: every number of a SLAM, of the actors or of a scanner."""
 
-from __future__ import annotations
-
 import json
 import math
 from itertools import groupby
@@ -117,7 +115,7 @@ def _print_dynamism(as_json: bool) -> None:
     console.print(table)
 
 
-def _trees(what: str) -> tuple[Settings, Settings]:
+def _trees(what: str) -> "tuple[Settings, Settings]":
     """That tree and its default."""
     from slam.errors import UnknownNameError, meant
 
@@ -140,7 +138,7 @@ def _trees(what: str) -> tuple[Settings, Settings]:
     return found
 
 
-def _chosen(rows: list[Row], group: str) -> list[Row]:
+def _chosen(rows: "list[Row]", group: str) -> "list[Row]":
     from slam.errors import UnknownNameError, meant
 
     def within(path: str) -> bool:
@@ -155,7 +153,7 @@ def _chosen(rows: list[Row], group: str) -> list[Row]:
     return chosen
 
 
-def _plain(row: Row) -> dict[str, Any]:
+def _plain(row: "Row") -> dict[str, Any]:
     about = row.about
     words: dict[str, Any] = {
         "path": row.path, "value": row.value, "unit": about.unit, "meaning": about.meaning,
@@ -168,7 +166,7 @@ def _plain(row: Row) -> dict[str, Any]:
     return words | {"low": about.low, "high": about.high}
 
 
-def _print(rows: list[Row], changed: dict[str, Any]) -> None:
+def _print(rows: "list[Row]", changed: dict[str, Any]) -> None:
     from rich.markup import escape
     from rich.table import Table
 

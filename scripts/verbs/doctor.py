@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia doctor``: what works here, and how to get what does not."""
 
-from __future__ import annotations
-
 from typing import TYPE_CHECKING, Annotated
 
 import typer
@@ -43,7 +41,7 @@ def doctor(
         raise MobiliaError(f"needed and missing: {', '.join(missing)}")
 
 
-def _print(finding: Finding) -> None:
+def _print(finding: "Finding") -> None:
     told = f"{_MARKS[finding.state]} {escape(f'{finding.what:<24}')} {escape(finding.found)}"
     say(told, highlight=False)
     if finding.how:

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia export``: an episode, or any bag, in the formats of others."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from functools import partial
 from pathlib import Path
@@ -17,7 +15,6 @@ from slam.errors import InvalidValueError
 from slam.files import replacing
 
 if TYPE_CHECKING:
-    import numpy as np
     from numpy.typing import NDArray
 
     from slam.frames import Frame, Stream
@@ -75,7 +72,7 @@ def _beside(log: Path) -> Path:
     return next(free, log.parent)
 
 
-def _tum(target: Path, stream: Stream) -> list[Path]:
+def _tum(target: Path, stream: "Stream") -> list[Path]:
     import numpy as np
 
     from slam.frames import EPOCH
@@ -97,7 +94,7 @@ def _tum(target: Path, stream: Stream) -> list[Path]:
     return written
 
 
-def _smfeval(target: Path, stream: Stream, slam: str) -> list[Path]:
+def _smfeval(target: Path, stream: "Stream", slam: str) -> list[Path]:
     import numpy as np
 
     from scripts.machine import versions
@@ -131,14 +128,14 @@ def _smfeval(target: Path, stream: Stream, slam: str) -> list[Path]:
     return written
 
 
-def _carmen(target: Path, stream: Stream) -> list[Path]:
+def _carmen(target: Path, stream: "Stream") -> list[Path]:
     from slam.logs import write_carmen
 
     write_carmen(target, stream)
     return [target]
 
 
-def _npz(target: Path, stream: Stream) -> list[Path]:
+def _npz(target: Path, stream: "Stream") -> list[Path]:
     import numpy as np
 
     from slam.frames import EPOCH
@@ -163,7 +160,7 @@ def _npz(target: Path, stream: Stream) -> list[Path]:
     return [target]
 
 
-def _optional(frames: list[Frame]) -> dict[str, NDArray[Any]]:
+def _optional(frames: "list[Frame]") -> "dict[str, NDArray[Any]]":
     """What every frame has, of what it need not have."""
     import numpy as np
 

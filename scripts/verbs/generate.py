@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia generate``: a dataset of episodes in rooms that move."""
 
-from __future__ import annotations
-
 import os
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -115,7 +113,7 @@ def generate(
     _page(plan, out, table)
 
 
-def _page(plan: Plan, out: Path, table: Table) -> None:
+def _page(plan: "Plan", out: Path, table: "Table") -> None:
     """What was made, a plan of the first episode at its start, and what it is good for."""
     from scripts.pages.page import Page, Part, command, inline, publish
     from sim.simulation import Simulation

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia lifelong``: SLAMs over the sessions of a building, each in the map of those before."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated, Any
@@ -96,7 +94,7 @@ def lifelong(
         _write(names, drives, _settings(recipe, sessions, first_s), out, overwrite)
 
 
-def _settings(recipe: Recipe, sessions: int, first_seconds: float) -> dict[str, Any]:
+def _settings(recipe: "Recipe", sessions: int, first_seconds: float) -> dict[str, Any]:
     return {
         "scene": recipe.scene, "seed": recipe.seed, "dynamism": recipe.dynamism,
         "motion": recipe.motion, "change": recipe.change, "sessions": sessions,
@@ -107,7 +105,7 @@ def _settings(recipe: Recipe, sessions: int, first_seconds: float) -> dict[str, 
 
 def _write(
     names: list[str],
-    drives: Iterator[Drive],
+    drives: "Iterator[Drive]",
     settings: dict[str, Any],
     out: Path | None,
     overwrite: bool,
@@ -161,7 +159,7 @@ def _write(
     tell(path, page)
 
 
-def _sentence(building: Building, rows: list[Row], aged: list[Row]) -> str:
+def _sentence(building: "Building", rows: list[Row], aged: list[Row]) -> str:
     """What the sessions of a SLAM come to."""
     from scripts.days.scores import of_building
     from scripts.report.score_tables import sentences
@@ -172,7 +170,7 @@ def _sentence(building: Building, rows: list[Row], aged: list[Row]) -> str:
     return sentences([of_building(of, rows, old, failure)])[0]
 
 
-def _noted(drives: Iterator[Drive], kept: dict[int, Drive]) -> Iterator[Drive]:
+def _noted(drives: "Iterator[Drive]", kept: "dict[int, Drive]") -> "Iterator[Drive]":
     """The same, each also kept for the comparison of sessions."""
     for drive in drives:
         kept[drive.number] = drive

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia live``: a running world or a log as a page, to watch, to steer and to disturb."""
 
-from __future__ import annotations
-
 import webbrowser
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -101,7 +99,7 @@ def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
     return log if log is not None else bag
 
 
-def _network(middleware: str, *, is_log: bool) -> Network:
+def _network(middleware: str, *, is_log: bool) -> "Network":
     """The robot on the network; ``InvalidValueError``, ``MissingDependencyError``."""
     from scripts.live.view import Network
     from slam.ros.link import domain_of_environment, open_link, open_to_others
@@ -116,8 +114,8 @@ def _network(middleware: str, *, is_log: bool) -> Network:
 
 
 def _serve(
-    opener: Opener, address: tuple[str, int], origins: list[str], *, playing: bool, speed: float,
-    browser: bool = False, network: Network | None = None,
+    opener: "Opener", address: tuple[str, int], origins: list[str], *, playing: bool, speed: float,
+    browser: bool = False, network: "Network | None" = None,
 ) -> None:  # fmt: skip
     from scripts.live.view import View
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia render``: a film, a strip or a page to turn of a run, an episode or a log."""
 
-from __future__ import annotations
-
 import math
 import time
 from contextlib import ExitStack
@@ -105,8 +103,8 @@ def render(
 
 
 def _render(
-    footage: Footage,
-    show: Show,
+    footage: "Footage",
+    show: "Show",
     out: Path | None,
     strip_to: Path | None,
     moments: list[float],
@@ -140,8 +138,8 @@ def _render(
 
 
 def _pace(
-    footage: Footage, fps: float, from_s: float, to_s: float | None, speed: float | None
-) -> Pace:
+    footage: "Footage", fps: float, from_s: float, to_s: float | None, speed: float | None
+) -> "Pace":
     from scripts.film.encode import Pace
 
     end = footage.duration_s if to_s is None else to_s

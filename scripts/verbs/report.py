@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia report``: a comparison as one page."""
 
-from __future__ import annotations
-
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -61,7 +59,7 @@ def report(
     say(f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).")
 
 
-def _replays(about: Study) -> list[str]:
+def _replays(about: "Study") -> list[str]:
     """Pages of the subject's worst run in each scene, made again from its recipe."""
     from scripts.comparison.plan import Run
     from scripts.film.footage import open_run

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia reproduce``: each experiment of the paper by one command."""
 
-from __future__ import annotations
-
 import importlib
 import os
 from collections.abc import Callable
@@ -57,7 +55,7 @@ def reproduce(
         note("victoria-park is left out: pass --data with the folder of the dataset")
 
 
-def experiment(name: str) -> Callable[[Plan], None]:
+def experiment(name: str) -> "Callable[[Plan], None]":
     """The function that runs it."""
     module = importlib.import_module(f"scripts.paper.{name.replace('-', '_')}")
     function: Callable[[Plan], None] = module.reproduce

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia verify``: is a result what it was, and does its recipe still make it?"""
 
-from __future__ import annotations
-
 import secrets
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -92,7 +90,7 @@ def verify(
 def _of_submission(
     path: Path, regenerate_: int, rerun: int, seed: int, slam: str | None, sealed: Path | None,
     trust: bool,
-) -> list[Finding]:  # fmt: skip
+) -> "list[Finding]":  # fmt: skip
     """A finding for each of its runs that was made again."""
     from scripts.benchmark import submission
     from scripts.benchmark.submission import made_again
@@ -116,7 +114,7 @@ def _by_chance(count: int) -> int:
     return seed
 
 
-def _check_sealed(given: Submission, path: Path) -> None:
+def _check_sealed(given: "Submission", path: Path) -> None:
     from scripts.benchmark import sealed, submission
     from scripts.benchmark.tracks import LEVELS
 
@@ -141,7 +139,7 @@ def _judgement(again: int, rerun: int) -> str:
     return f"the file is whole, {made}; the results are the submitter's word"
 
 
-def _made_again(episodes: list[Path], trust: bool) -> list[Finding]:
+def _made_again(episodes: list[Path], trust: bool) -> "list[Finding]":
     """A finding for each episode, simulated again."""
     from sim.recording.recipe import RECIPE, read_recipe
     from sim.recording.verify import regenerate
@@ -167,7 +165,7 @@ def _drawn(episodes: list[Path], count: int, seed: int) -> list[Path]:
     return [episodes[k] for k in sorted(drawn.tolist())]
 
 
-def _exit_if_bad(findings: list[Finding]) -> None:
+def _exit_if_bad(findings: "list[Finding]") -> None:
     """End with the status of the worst of them, where one is not whole."""
     from sim.recording.verify import STATUS
 
@@ -178,7 +176,7 @@ def _exit_if_bad(findings: list[Finding]) -> None:
         raise typer.Exit(worst.status)
 
 
-def _sound(folder: Path, findings: list[Finding]) -> list[Path]:
+def _sound(folder: Path, findings: "list[Finding]") -> list[Path]:
     """The episodes that can be made again: planned, and with nothing of theirs missing."""
     from sim.recording.dataset import episodes_in
 
@@ -186,12 +184,12 @@ def _sound(folder: Path, findings: list[Finding]) -> list[Path]:
     return [path for path in episodes_in(folder.resolve()) if path.name in sound]
 
 
-def _words(finding: Finding) -> str:
+def _words(finding: "Finding") -> str:
     why = finding.why if len(finding.why) <= 300 else f"{finding.why[:300]} ..."
     return f"{finding.verdict}: {why}"
 
 
-def _tell(finding: Finding) -> None:
+def _tell(finding: "Finding") -> None:
     color = _COLORS.get(finding.verdict, "yellow")
     why = f": {plain(finding.why)}" if finding.why else ""
     say(f"[{color}]{finding.verdict}[/{color}] {plain(finding.episode)}{why}")

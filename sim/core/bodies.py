@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Where things are: the movers of a scene found in its compiled model, placed, read, saved."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import TYPE_CHECKING, Any
@@ -69,7 +67,7 @@ class Bodies:
     robot          index of the robot, None in a scene without one
     """
 
-    def __init__(self, model: mujoco.MjModel, scene: Scene) -> None:
+    def __init__(self, model: mujoco.MjModel, scene: "Scene") -> None:
         self.model = model
         self.scene = scene
         self.robot: int | None = next(
@@ -96,7 +94,7 @@ class Bodies:
         names = (self.model.body(b).name for b in range(self.model.nbody))
         return np.array([self._row.get(n.partition("/")[0], STATIC) for n in names], dtype=np.int64)
 
-    def _add_planar(self, i: int, mover: Mover) -> None:
+    def _add_planar(self, i: int, mover: "Mover") -> None:
         joints = [self.model.joint(f"{mover.name}/{axis}") for axis in ("x", "y", "yaw")]
         addresses = [int(j.qposadr[0]) for j in joints]
         if addresses != list(range(addresses[0], addresses[0] + 3)):
@@ -105,7 +103,7 @@ class Bodies:
             )
         self._qpos[i], self._dof[i] = addresses[0], int(joints[0].dofadr[0])
 
-    def _add_door(self, i: int, mover: Mover, data: mujoco.MjData) -> None:
+    def _add_door(self, i: int, mover: "Mover", data: mujoco.MjData) -> None:
         joint = self.model.joint(f"{mover.name}/{joint_of_door(mover.kind)}")
         self._qpos[i], self._dof[i] = int(joint.qposadr[0]), int(joint.dofadr[0])
         body = int(joint.bodyid[0])

@@ -5,8 +5,6 @@ Cells lie on a square lattice; cell (i, j) is centred at ((i + 0.5) cell, (j + 0
 pooled in blocks of 8 x 8; a directory maps a block's place to its slot in the pool.
 """
 
-from __future__ import annotations
-
 import abc
 import copy
 import math

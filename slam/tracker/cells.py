@@ -5,8 +5,6 @@ A cell costs memory only where its block lives; a block is born under an impress
 every cell in it is silent.
 """
 
-from __future__ import annotations
-
 import math
 from typing import Any, NamedTuple
 

@@ -5,8 +5,6 @@
 spacing, scan rate, odometry covariance, range) are none of them: they are read from the frame.
 """
 
-from __future__ import annotations
-
 from collections.abc import Mapping
 from dataclasses import dataclass, field
 from typing import Any, ClassVar, Self

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers of the map that no preset turns; decay and trace: ``slam.tracker.config``."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from slam.settings import Settings, number

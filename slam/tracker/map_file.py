@@ -10,8 +10,6 @@ Version 2 has more arrays, which the header names as ``extra``: what a package a
 the map. A map without any is written as version 1, and one of version 1 is read as one without.
 """
 
-from __future__ import annotations
-
 import dataclasses
 import hashlib
 import json

@@ -6,8 +6,6 @@ analytic peak 1 (not the largest sampled value), as everything else makes struct
 cell centres (pixel locking).
 """
 
-from __future__ import annotations
-
 import functools
 import math
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A SLAM on a map of cells, whatever the map: scan matching, uncertainty, relocalisation, loops."""
 
-from __future__ import annotations
-
 import abc
 from collections.abc import Mapping
 from dataclasses import replace

@@ -7,8 +7,6 @@ Compiled code is cached on disk: the seconds are spent once after an installatio
 process where no folder for the cache can be written.
 """
 
-from __future__ import annotations
-
 import functools
 import gc
 from collections.abc import Callable

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rectangles of a map's cells as arrays, at the cost of the blocks that live there."""
 
-from __future__ import annotations
-
 from typing import NamedTuple
 
 import numpy as np

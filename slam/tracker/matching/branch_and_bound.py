@@ -4,8 +4,6 @@
 Of equally good candidates the one of the lowest heading, then row, then column is taken.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ Every kind of work has a price in ns, measured once. So the same frames give the
 machine, however busy.
 """
 
-from __future__ import annotations
-
 from slam.tracker.matching.config import BudgetConfig
 
 NS_PER_MS = 1e6

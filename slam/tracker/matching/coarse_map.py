@@ -4,8 +4,6 @@
 It holds as long as the map is not written to: while the robot is lost.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers of scan matching: score, climb, local and global search."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from slam.settings import Settings, number

@@ -6,8 +6,6 @@ bound the overlap of whole blocks of offsets from above. The prior enters a boun
 its heading alone costs, so no bound is ever too low and the result equals exhaustive search.
 """
 
-from __future__ import annotations
-
 import functools
 import math
 from dataclasses import dataclass
@@ -36,7 +34,7 @@ class SearchWindow:
     turn_rad: float
 
     @classmethod
-    def about(cls, prior: Float, config: LocalConfig) -> SearchWindow:
+    def about(cls, prior: Float, config: LocalConfig) -> "SearchWindow":
         """Some standard deviations of a (3, 3) prior, within the widest."""
         reach_m = config.sigmas * math.sqrt(max(prior[0, 0], prior[1, 1]))
         turn_rad = config.sigmas * math.sqrt(prior[2, 2])
@@ -46,7 +44,7 @@ class SearchWindow:
         )
 
     @classmethod
-    def widest(cls, config: LocalConfig) -> SearchWindow:
+    def widest(cls, config: LocalConfig) -> "SearchWindow":
         """As far as is ever searched around a prediction."""
         return cls(reach_m=config.reach_m, turn_rad=config.turn_rad)
 

@@ -4,8 +4,6 @@
 By what matches were like so far it is told which scans are worth a search.
 """
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from collections.abc import Sequence

@@ -7,8 +7,6 @@ a plane (w, w, rows / w, columns / w) holds at [r % w, c % w, r // w, c // w] th
 w x w values from (r, c) on.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

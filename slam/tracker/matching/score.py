@@ -6,8 +6,6 @@ pre-blurred fields pull structure towards cell centres, and a map that is rewrit
 poses then creeps. Gradient and curvature of that sum are analytic.
 """
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

@@ -4,8 +4,6 @@
 The answers are the same, in the same order, however the work is divided.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

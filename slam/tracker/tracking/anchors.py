@@ -7,8 +7,6 @@ both ways the less counts: their errors are not independent. What the pose graph
 that is still in use is an error of that map.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Mapping, Sequence
 from typing import TypeAlias

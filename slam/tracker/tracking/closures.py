@@ -6,8 +6,6 @@ would hide the drift that a loop is to correct. A closure is a match to the litt
 stretch of the way, searched for in a window (``search``) or started from a prediction (``tie``).
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable, Generator, Iterable
 

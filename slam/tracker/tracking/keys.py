@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Key frames of long runs: one each metre or half a radian, with the motion between them."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass, replace
 

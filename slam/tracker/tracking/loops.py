@@ -7,8 +7,6 @@ those before, a search for a closure, the graph, and ties to every other passage
 pause between matches.
 """
 
-from __future__ import annotations
-
 import logging
 import math
 from collections import deque

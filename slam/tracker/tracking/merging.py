@@ -7,8 +7,6 @@ lead to the older one instead, so that what was joined stays joined. Its closure
 has its own.
 """
 
-from __future__ import annotations
-
 from collections.abc import Iterable, Sequence
 from dataclasses import replace
 from typing import TypeVar
@@ -48,7 +46,7 @@ class Merge:
         tied: Iterable[int],
         searched: int,
         config: LoopsConfig,
-    ) -> Merge:
+    ) -> "Merge":
         """Key frames near one that is ``tied`` go where an older one is near; not the newest.
 
         poses    (n, 3) by the graph; so many of them were ``searched`` for closures

@@ -5,8 +5,6 @@ A part is known by the key frame in its middle, one in ``LoopsConfig.every``: a 
 about it. Where the key frames lie, the pose graph says: ``poses``, (3,) each, of those in it.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Work that pauses, so that no scan takes long."""
 
-from __future__ import annotations
-
 from collections.abc import Callable, Iterator
 from typing import Any
 

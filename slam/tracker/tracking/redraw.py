@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The map drawn anew from key frames, a few each scan, while tracking goes on in the old one."""
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass
 

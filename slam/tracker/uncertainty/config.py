@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers of the pose covariance, its residuals, and the odometry noise."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass, field
 
 from slam.settings import Settings, number

@@ -4,8 +4,6 @@
 Element by element: whole-array expressions take seconds to compile.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

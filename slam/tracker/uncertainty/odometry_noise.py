@@ -9,8 +9,6 @@ Wheels that slip, or people who push the robot, do so for some tenths of a secon
 in a row that odometry cannot have led to, its next increments may be off by as much.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 from typing import Self

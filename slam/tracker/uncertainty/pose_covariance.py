@@ -14,8 +14,6 @@ Errors that surfaces share average out over the surfaces in view, so their varia
 proportion to how much of them is seen.
 """
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -10,8 +10,6 @@ Chords between such points also give the direction of a surface better than neig
 whose noise alone would make a smooth corridor look rough.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 from typing import NamedTuple

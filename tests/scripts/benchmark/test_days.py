@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The leaderboard's section over days: what it runs, what it says, how it gets into the docs."""
 
-from __future__ import annotations
-
 import json
 import math
 from pathlib import Path

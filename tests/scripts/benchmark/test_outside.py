@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """docs/benchmark.md does what it says, followed from a folder outside, with a SLAM of one's own."""
 
-from __future__ import annotations
-
 import json
 import re
 import shlex

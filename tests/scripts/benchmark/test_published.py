@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The runs that ship: whole, of tracks that count, and taken on the very same recordings alone."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

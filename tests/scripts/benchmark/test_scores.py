@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What the leaderboard says of hand-made runs."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Seeds that are promised by their hash, and runs of a submission that come out again."""
 
-from __future__ import annotations
-
 import json
 from dataclasses import replace
 from pathlib import Path

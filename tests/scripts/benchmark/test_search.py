@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The search for rooms that are hard and fair: what it draws, when it gives one up, going on."""
 
-from __future__ import annotations
-
 import json
 from pathlib import Path
 from typing import Any

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A submission comes back as it was written; anything else is refused by name."""
 
-from __future__ import annotations
-
 import json
 from collections.abc import Callable
 from dataclasses import replace

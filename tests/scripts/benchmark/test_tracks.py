@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The tracks: each as it was published, each possible, and a new one beside them."""
 
-from __future__ import annotations
-
 from collections.abc import Iterator
 from pathlib import Path
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A campaign has as many losses as asked for, goes on where it was stopped, and tells the truth."""
 
-from __future__ import annotations
-
 import json
 import math
 from dataclasses import replace

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is hazardous, how long an outage lasts, and bounds against the distributions they invert."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The fit finds the weights that data were drawn with, and the curve tells who is overconfident."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A carried robot and a pushed SLAM, on streams made by hand."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The plane: beams against distances by hand, wheels against sampling, same seed same bytes."""
 
-from __future__ import annotations
-
 import hashlib
 import math
 from itertools import pairwise

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The trees of trackers: recipes and saved maps hold their paths and digests."""
 
-from __future__ import annotations
-
 import pytest
 
 from slam.errors import UnknownNameError

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A map written and read back is the same map, and whatever is no map is refused by name."""
 
-from __future__ import annotations
-
 import io
 import json
 import math

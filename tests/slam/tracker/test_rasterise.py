@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The input I of Eq. (8): Gaussians of analytic peak 1, combined by the largest."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Branch and bound is exhaustive search, only faster."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

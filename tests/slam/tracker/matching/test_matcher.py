@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Matching: derivatives, branch and bound, impressions, prior."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What matches were like so far, and which scan is odd by that."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 from types import SimpleNamespace
 from typing import Any

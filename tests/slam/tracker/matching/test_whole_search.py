@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The search of the whole map: bounded work a scan, and the answers of a search in one go."""
 
-from __future__ import annotations
-
 import copy
 import math
 from itertools import combinations

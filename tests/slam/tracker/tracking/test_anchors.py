@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What loops say of the map's error where the robot is."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

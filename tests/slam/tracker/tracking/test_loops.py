@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Loops of long runs."""
 
-from __future__ import annotations
-
 import copy
 import itertools
 from collections.abc import Generator

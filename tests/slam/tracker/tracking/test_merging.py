@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Key frames of one place become one."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

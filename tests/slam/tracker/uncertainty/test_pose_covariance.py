@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Honest covariances: against sampling, with known errors, and where walls say nothing."""
 
-from __future__ import annotations
-
 import dataclasses
 import math
 from typing import Any
