@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Sections 3.1 to 3.4: what the paper claims of its network's cost and overlap, measured on ours.
 
-What it claims of single neurons is held by ``tests/slam/shunting/map``.
+What it claims of single neurons is held by ``tests/slam/shunting/map`` and
+``tests/slam/tracker/test_network.py``.
 """
 
 import time
@@ -25,10 +26,10 @@ from slam.frames import Float, Frame
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_steps import thinned
 from slam.shunting.featured import FeaturedShuntingSlam
-from slam.shunting.map.network import Network
 from slam.shunting.slam import ShuntingConfig, ShuntingSlam
 from slam.tracker.cells import SIDE, Look
 from slam.tracker.matching.matcher import Matcher
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 
 RED, BLUE, GREEN, GREY = "#ce2c3c", "#1f61be", "#168c5a", "#5b6472"

@@ -17,7 +17,6 @@ from slam._jit import njit
 from slam.frames import Float
 from slam.frontend.visibility import View, block_is_hidden, seen_empty
 from slam.settings import Settings, number
-from slam.shunting.map.network import Network
 from slam.system import Raster, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
@@ -30,6 +29,7 @@ from slam.tracker.cells import (
     in_reach,
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
+from slam.tracker.network import Network
 from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 from slam.tracker.tracker import Tracker
 

@@ -6,9 +6,9 @@ from typing import ClassVar
 
 from slam.estimate import Changes, Raster
 from slam.shunting.map import export
-from slam.shunting.map.network import Network
 from slam.system import register
 from slam.tracker.config import TrackerConfig
+from slam.tracker.network import Network
 from slam.tracker.tracker import Tracker
 
 

@@ -6,7 +6,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.estimate import Changes, Raster
-from slam.shunting.map.network import Network
+from slam.tracker.network import Network
 from slam.tracker.windows import Window, window
 
 Blocks = NDArray[np.float32]  # (n, 8, 8)

@@ -9,8 +9,8 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 from slam.frames import Float
-from slam.shunting.map.network import Network
 from slam.tracker.cells import MASK, SHIFT, SIDE, Cells
+from slam.tracker.network import Network
 
 MOST = 1 << 14  # peaks returned at most
 

@@ -11,8 +11,8 @@ from slam import se2
 from slam.frames import Features, Scan
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.visibility import SILENT_M, View
-from slam.shunting.map.network import Network
 from slam.shunting.slam import ShuntingConfig
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from tests.world2d import World2D, laser, rectangle
 

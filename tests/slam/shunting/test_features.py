@@ -15,10 +15,10 @@ from slam.frames import Features, Frame, LaserSpec, Odometry, Scan
 from slam.frontend.observations import from_features
 from slam.replay import Track
 from slam.shunting.featured import PAPER_REWARD, FeaturedShuntingSlam
-from slam.shunting.map.network import Network
 from slam.shunting.map.peaks import peaks
 from slam.shunting.slam import ShuntingConfig
 from slam.tracker.matching.matcher import Match
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from slam.trajectory import Trajectory
 

@@ -10,10 +10,10 @@ from scripts.benches.slam import enlarge
 from slam import se2
 from slam.frontend.observations import from_scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.shunting.map.network import Network
 from slam.tracker.cells import FREE_COUNT, TOUCHED_COUNT, living
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Matcher
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from tests.world2d import World2D, arena, frames, laser, office, office_loop, wander
 

@@ -10,8 +10,8 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.frames import Features
 from slam.frontend.observations import Observations, from_features
-from slam.shunting.map.network import Network
 from slam.shunting.slam import ShuntingConfig
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 
 Array = NDArray[np.float64]

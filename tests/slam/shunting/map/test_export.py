@@ -8,9 +8,9 @@ from slam.frontend.visibility import view_of_beams
 from slam.grid.occupancy import OccupancySlam
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.shunting.map.export import changes, existence
-from slam.shunting.map.network import Network
 from slam.system import Raster
-from tests.slam.shunting.map.test_network import look, point
+from slam.tracker.network import Network
+from tests.slam.tracker.test_network import look, point
 
 CELL = 0.1
 STAYS, LEAVES, COMES = (1.05, 2.05), (3.05, 2.05), (5.05, 2.05)

@@ -10,9 +10,9 @@ from hypothesis import strategies as st
 from numpy.typing import NDArray
 
 from slam.frontend.visibility import View
-from slam.shunting.map.network import Network
 from slam.shunting.slam import ShuntingConfig
 from slam.tracker.cells import FREE_COUNT, SIDE, TOUCHED_COUNT
+from slam.tracker.network import Network
 
 Array = NDArray[np.float64]
 CELL, ACROSS = 0.1, 2  # blocks along an edge of the test fields

@@ -12,9 +12,9 @@ from slam import se2
 from slam.frames import Scan
 from slam.frontend.observations import Observations, from_scan
 from slam.grid.occupancy import Grid, OccupancyConfig
-from slam.shunting.map.network import Network
 from slam.shunting.slam import ShuntingConfig
 from slam.tracker.cell_map import CellMap
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from tests.world2d import World2D, laser
 

@@ -13,11 +13,11 @@ from slam.frames import Features, Odometry, Scan
 from slam.frontend import surfaces
 from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_prior import inverted, predict, turned
-from slam.shunting.map.network import Network
 from slam.shunting.slam import ShuntingConfig
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Matcher, seen_by
 from slam.tracker.matching.score import evaluate
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from tests.world2d import World2D, arena, laser, rectangle
 

@@ -6,8 +6,8 @@ import pytest
 
 from slam import se2
 from slam.shunting import ShuntingConfig
-from slam.shunting.map.network import Network
 from slam.tracker.matching.matcher import Matcher
+from slam.tracker.network import Network
 from slam.tracker.tracking.closures import Closures
 from slam.tracker.tracking.keys import KeyFrames
 from tests.slam.tracker.tracking.test_loops import seen

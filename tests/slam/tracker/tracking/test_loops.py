@@ -14,8 +14,8 @@ from slam.frames import Frame
 from slam.frontend.observations import Observations, from_scan
 from slam.posegraph import Edge
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.shunting.map.network import Network
 from slam.tracker.matching.matcher import Matcher
+from slam.tracker.network import Network
 from slam.tracker.tracking import closures
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.loops import Loops

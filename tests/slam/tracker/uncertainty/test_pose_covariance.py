@@ -13,9 +13,9 @@ from slam.frames import Float, Frame, Odometry, Scan
 from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.shunting.map.network import Network
 from slam.system import Estimate
 from slam.tracker.matching.matcher import Match, Matcher
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from slam.tracker.uncertainty.covariances import innovation, observable
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise

@@ -12,8 +12,8 @@ from slam import se2
 from slam.errors import InvalidValueError
 from slam.frontend.observations import Observations
 from slam.frontend.visibility import View, view_of_beams, view_of_features
-from slam.shunting.map.network import Network, lateral_mu
 from slam.shunting.slam import ShuntingConfig
+from slam.tracker.network import Network, lateral_mu
 from slam.tracker.rasterise import rasterise
 
 ORIGIN = np.zeros(3)

@@ -2,7 +2,8 @@
 """The shunting network, Eq. (8): a map whose cells are neurons, and a running mean of their input.
 
 The short-term mean is the activity x of Eq. (8), which leaks; the long-term one is no part of it.
-Blocks of neurons are born under an observation and die when every neuron in them is silent.
+It is the map of "shunting"; the loops of "occupancy" draw their key frames in one, too. Blocks of
+neurons are born under an observation and die when every neuron in them is silent.
 """
 
 import math
