@@ -68,6 +68,8 @@ class LaserSpec(ByContent):
     T_robot_laser      (3,) pose of the laser on the robot (m, m, rad), within 30 m of its origin
     range_sigma_m      m, standard deviation of a range at 5 m, rounding included; 0 where nobody
                        states it: logs and bags do not
+    angles             (n_beams,) rad, beam directions in the laser frame, by the above
+    sweep_duration     s from the stamp to the last beam, by the above
 
     Raises ``InvalidValueError`` for anything else.
     """
@@ -80,6 +82,8 @@ class LaserSpec(ByContent):
     beam_time_offsets: Float = field(default_factory=lambda: np.zeros(0))
     T_robot_laser: Float = field(default_factory=lambda: np.zeros(3))
     range_sigma_m: float = 0.0
+    angles: Float = field(init=False, repr=False)
+    sweep_duration: float = field(init=False, repr=False)
 
     def __post_init__(self) -> None:
         self._check_angles()
@@ -102,7 +106,8 @@ class LaserSpec(ByContent):
         angles = self.angle_min + np.arange(self.n_beams) * self.angle_increment
         angles.setflags(write=False)
         offsets = self._offsets()
-        set_fields(self, beam_time_offsets=offsets, T_robot_laser=mounted, _angles=angles)
+        set_fields(self, beam_time_offsets=offsets, sweep_duration=float(offsets.max()))
+        set_fields(self, T_robot_laser=mounted, angles=angles)
 
     def _check_angles(self) -> None:
         if not is_whole(self.n_beams) or not 1 <= self.n_beams <= MOST_BEAMS:
@@ -147,17 +152,6 @@ class LaserSpec(ByContent):
                 f"and <= {MOST_SWEEP_S:g} s, got {offsets.min()} to {offsets.max()}"
             )
         return offsets
-
-    @property
-    def angles(self) -> Float:
-        """(n_beams,) rad, beam directions in the laser frame."""
-        angles: Float = self._angles  # type: ignore[attr-defined]
-        return angles
-
-    @property
-    def sweep_duration(self) -> float:
-        """Seconds from the stamp to the last beam."""
-        return float(self.beam_time_offsets.max())
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

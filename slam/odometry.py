@@ -5,7 +5,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float, Frame, Odometry
-from slam.frontend import odometry_steps
+from slam.frontend import odometry_prior
 from slam.path import OnPath, PosePath
 from slam.system import Estimate, register
 
@@ -33,13 +33,13 @@ class OdometrySlam(OnPath):
         """The odometry pose relative to the first frame.
 
         Raises ``InvalidValueError`` for a frame that does not come after the last one and where a
-        step is none (``slam.frontend.odometry_steps``), as all SLAMs here do.
+        step is none (``slam.frontend.odometry_prior``), as all SLAMs here do.
         """
         self._path.check_order(frame.stamp_ns)
         now = frame.odometry
         if self._first is None or self._before is None:
             self._first = self._before = now
-        odometry_steps.increment(self._before, now)
+        odometry_prior.motion(self._before, now)
         self._before = now
         T_map_robot = se2.between(self._first.T_odom_robot, now.T_odom_robot)
         increment_covariance = now.increment_covariance
@@ -49,7 +49,7 @@ class OdometrySlam(OnPath):
                 self._covariance,
                 self._T_map_robot,
                 T_before_now,
-                odometry_steps.known(increment_covariance),
+                odometry_prior.known(increment_covariance),
             )
         self._T_map_robot = T_map_robot
         self._path.add(frame.stamp_ns, T_map_robot)

@@ -23,7 +23,7 @@ from slam.ekf.config import EkfConfig
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate, Landmarks
 from slam.frames import Features, Float, Frame, Odometry, Scan
-from slam.frontend import odometry_steps
+from slam.frontend import odometry_prior
 from slam.frontend.corners import answered, corners
 from slam.frontend.odometry_prior import assumed_covariance
 from slam.frontend.polar import hidden, polar
@@ -246,7 +246,7 @@ class EkfSlam(OnPath):
 
     def _predict(self, odometry: Odometry) -> None:
         if self._before is not None:
-            increment = odometry_steps.increment(self._before, odometry)
+            increment = odometry_prior.motion(self._before, odometry)
             covariance = odometry.increment_covariance
             if covariance is None:
                 covariance = assumed_covariance(increment)

@@ -12,10 +12,17 @@ from dataclasses import dataclass, field
 import numpy as np
 
 from slam import se2
+from slam.errors import InvalidValueError
 from slam.frames import MOST_TWIST, Float, Odometry
-from slam.frontend import odometry_steps
 from slam.frontend.config import FRONTEND, BiasConfig
 
+# From frame to frame.
+MOST_STEP_M = 1000.0  # between two frames: farther, the stream is broken or of another run
+MOST_POSE = 1e9  # m and rad from the origin: there a double still resolves 0.1 micrometres
+MOST_STD = 1e4  # m and rad, of an increment; with more, rounding would eat what is known beside
+HUGE = 1.0  # m^2 or rad^2: from there on,
+MOST_CORRELATION = 1.0 - 1e-6  # exact correlations would leave nothing of what is known beside
+LEAST_SHARE = 1e-12  # of the larger variance of position that the smaller one must have
 # The heading bias; set by hand.
 LASTS_S = 1000.0  # s in which a robot's bias may change by 1 sigma
 INDEPENDENT = 0.3  # share of a match's information, from frame to frame
@@ -30,7 +37,6 @@ LEAST_SCALE = 2.25  # least factor on a stated variance: else the map drifts unn
 LEAST_M, LEAST_RAD = 0.004, 0.003  # least deviation for the matcher, after FLOOR_S
 # deviations where none is stated: m/m, m/rad, rad/sqrt(m), rad/rad
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
-SLIP = 12.0  # squared innovation of three numbers that noise exceeds in 0.7 %; set by hand
 LEAST_VARIANCE = 1e-12  # m^2 and rad^2, added so that none is zero: (1 um)^2, (1 urad)^2
 TWIST_S = 0.5  # s, longest odometry step that gives a twist
 
@@ -187,9 +193,48 @@ class Prediction:
         off[2] = se2.wrap(float(off[2]))
         return off
 
-    def is_slip(self, T_map_robot: Float) -> bool:
-        """Whether odometry cannot have led to that pose."""
-        return squared(self.off(T_map_robot), self.prior) > SLIP
+
+def known(covariance: Float, most_m: float = MOST_STD, most_rad: float = MOST_STD) -> Float:
+    """A copy of an increment's covariance (3, 3) with standard deviations lowered to at most
+    these, the correlations kept: beyond, they mean "not known"."""
+    out = np.array(covariance, dtype=np.float64)
+    most = zip(out.diagonal().tolist(), (most_m, most_m, most_rad), strict=True)
+    scale = [min(1.0, limit / math.sqrt(v)) if v > 0.0 else 1.0 for v, limit in most]
+    if min(scale) < 1.0:
+        out *= np.outer(scale, scale)
+    return out
+
+
+def invertible(covariance: Float) -> Float:
+    """``known``, and such that its inverse can be computed: the very numbers, unless a variance is
+    ``HUGE``."""
+    out = known(covariance)
+    xx, yy, tt = out.diagonal().tolist()
+    if max(xx, yy, tt) > HUGE:
+        out *= MOST_CORRELATION
+        least = LEAST_SHARE * max(xx, yy)
+        np.fill_diagonal(out, [max(xx, least), max(yy, least), max(tt, 0.0)])
+    return out
+
+
+def motion(before: Odometry, now: Odometry) -> Float:
+    """(3,) ``T_before_now``. Raises ``InvalidValueError`` for a step that no robot makes."""
+    x, y, _ = before.T_odom_robot.tolist()
+    x_now, y_now, _ = now.T_odom_robot.tolist()
+    distance = math.hypot(x_now - x, y_now - y)
+    if not distance <= MOST_STEP_M:
+        raise InvalidValueError(
+            f"Odometry.T_odom_robot must move by at most {MOST_STEP_M:g} m from frame to frame, "
+            f"got {distance:g} m from {before.stamp_ns} ns to {now.stamp_ns} ns"
+        )
+    for odometry in (before, now):
+        farthest = max(map(abs, odometry.T_odom_robot.tolist()))
+        if farthest > MOST_POSE:
+            raise InvalidValueError(
+                f"Odometry.T_odom_robot must lie within {MOST_POSE:g} m and rad, got {farthest:g} "
+                f"at {odometry.stamp_ns} ns"
+            )
+    return se2.between(before.T_odom_robot, now.T_odom_robot)
 
 
 def assumed_covariance(increment: Float) -> Float:
@@ -226,7 +271,7 @@ def predict(
     ``scales`` multiply its variance of translation and of rotation; ``bias`` is taken out of the
     increment.
     """
-    increment = odometry_steps.increment(before, now)
+    increment = motion(before, now)
     if bias is not None:
         increment = bias.corrected(increment)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
@@ -234,7 +279,7 @@ def predict(
     if given is None:
         unscaled = assumed_covariance(increment)
     else:
-        unscaled = odometry_steps.invertible(given)
+        unscaled = invertible(given)
     unscaled = unscaled + LEAST_VARIANCE * IDENTITY
     share = min(max(elapsed, 1e-3), FLOOR_MOST_S) / FLOOR_S
     floor = share * FLOOR_M**2, share * FLOOR_RAD**2

@@ -9,7 +9,7 @@ from numpy.typing import ArrayLike, NDArray
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Float
-from slam.frontend import odometry_steps
+from slam.frontend import odometry_prior
 from slam.landmarks import kernels
 
 _FIRST_CAPACITY = 32
@@ -59,7 +59,7 @@ class EkfFilter:
         """
         heading = float(self.pose[2])
         self.pose = se2.compose(self.pose, increment)
-        Q = odometry_steps.known(np.asarray(covariance), MOST_STD_M, math.pi)
+        Q = odometry_prior.known(np.asarray(covariance), MOST_STD_M, math.pi)
         bend = 0.25 * Q[2, 2]
         Q[:2, :2] += bend * np.array([[Q[1, 1], -Q[0, 1]], [-Q[0, 1], Q[0, 0]]])
         kernels.disturb(self._P, self.pose, self._landmarks, self._n, heading, Q)

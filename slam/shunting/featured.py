@@ -103,6 +103,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
         self._gates = self.config.features.gates
         self._steps_s: deque[float] = deque(maxlen=self.config.features.steps)
         self._first_counts_s = 0.0
+        self._believe(self._match)
         self._pose_covariance = PoseCovariance(self.config, of_points=True)
         overlaps = self.config.objective == "log"
         self._odometry_noise = OdometryNoise.of_points(self.config, overlaps=overlaps)
@@ -122,7 +123,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
             self._first_counts_s = 0.0
         agreed = self._agreed(observations, prediction)
         if int(agreed.accepted.sum()) < self.config.features.enough_pairs:
-            return super()._match(observations, prediction, cell_map)
+            return self._matcher.match(observations, prediction, cell_map)
         pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
         if self.config.objective == "log":
             # Eq. (13) as printed, from where the pairs lead: the sum of the logarithms of overlaps

@@ -13,15 +13,17 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
+from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frontend.visibility import View
 from slam.tracker.cells import (
     ANEW,
+    FREE_COUNT,
     SIDE,
+    TOUCHED_COUNT,
     Cells,
     Look,
-    forget_impressions,
     living,
     no_cells,
     with_room,
@@ -32,6 +34,26 @@ from slam.tracker.windows import dense
 MAX_BLOCKS_ACROSS = 1 << 15  # directory edge; 7.8 km at 3 cm cells
 MAX_DIRECTORY = 1 << 26  # entries, 256 MiB: 1.9 km square
 MAX_CELLS = 1 << 26  # of a raster, 256 MiB: 245 m square at 3 cm; a larger map has wider cells
+
+
+@njit
+def _release(cells: Cells) -> None:
+    """Release the scratch of the present impressions; blocks that never came to life die."""
+    for k in range(cells.counts[TOUCHED_COUNT]):
+        slot, born = cells.touched[k, 0], cells.touched[k, 3]
+        cells.scratch_of[slot] = -1
+        row, column = cells.touched[k, 2] - cells.corner[1], cells.touched[k, 1] - cells.corner[0]
+        if born == 0 or cells.directory[row, column] != slot:
+            continue  # what died in the update is free already
+        alive = False
+        for j in range(SIDE):
+            for i in range(SIDE):
+                alive |= cells.x[slot, j, i] != 0.0 or cells.age[slot, j, i] != 0.0
+        if not alive:
+            cells.directory[row, column] = -1
+            cells.free[cells.counts[FREE_COUNT]] = slot
+            cells.counts[FREE_COUNT] += 1
+    cells.counts[TOUCHED_COUNT] = 0
 
 
 class CellMap(abc.ABC):
@@ -94,7 +116,7 @@ class CellMap(abc.ABC):
 
     def release(self) -> None:
         """Forget the present impressions, and the blocks that were born under them in vain."""
-        forget_impressions(self.cells)
+        _release(self.cells)
 
     def kept(self, slots: NDArray[np.int32]) -> NDArray[np.float32]:
         """(n, 8, 8) what a file keeps as ``age``."""

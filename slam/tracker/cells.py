@@ -11,7 +11,7 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner
 from slam.frontend.visibility import View
 
 SIDE = 8  # cells along a block's edge
@@ -154,26 +154,6 @@ def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
     """Slots (n,) of the living blocks and their block indices (n, 2: x, y), by rows."""
     rows, columns = np.nonzero(cells.directory >= 0)
     return cells.directory[rows, columns], np.stack([columns, rows], axis=1) + cells.corner
-
-
-@njit
-def forget_impressions(cells: Cells) -> None:
-    """Release the scratch of the present impressions; blocks that never came to life die."""
-    for k in range(cells.counts[TOUCHED_COUNT]):
-        slot, born = cells.touched[k, 0], cells.touched[k, 3]
-        cells.scratch_of[slot] = -1
-        row, column = cells.touched[k, 2] - cells.corner[1], cells.touched[k, 1] - cells.corner[0]
-        if born == 0 or cells.directory[row, column] != slot:
-            continue  # what died in the update is free already
-        alive = False
-        for j in range(SIDE):
-            for i in range(SIDE):
-                alive |= cells.x[slot, j, i] != 0.0 or cells.age[slot, j, i] != 0.0
-        if not alive:
-            cells.directory[row, column] = -1
-            cells.free[cells.counts[FREE_COUNT]] = slot
-            cells.counts[FREE_COUNT] += 1
-    cells.counts[TOUCHED_COUNT] = 0
 
 
 @inner

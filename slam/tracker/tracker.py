@@ -2,7 +2,7 @@
 """A SLAM on a map of cells, whatever the map: scan matching, uncertainty, relocalisation, loops."""
 
 import abc
-from collections.abc import Mapping
+from collections.abc import Callable, Mapping
 from dataclasses import replace
 from functools import partial
 from pathlib import Path
@@ -61,8 +61,7 @@ class Tracker(abc.ABC):
         self._pose_covariance = PoseCovariance(self.config)
         self._odometry_noise = OdometryNoise.of_beams(self.config)
         self._standing = Standing(self.config.standing)
-        usual, agreement = self._matcher.usual, self._standing.agreement
-        self._belief = Belief(self.config, self._matcher, self._match, usual, agreement)
+        self._believe(self._matcher.match)
         new_map = partial(self._new_map, self.config) if self.map_moves else None
         self._loops = Loops(self.config, self._matcher, self._new_submap, new_map)
         self._trusted = True  # the pose of the frame before
@@ -72,6 +71,11 @@ class Tracker(abc.ABC):
     @abc.abstractmethod
     def _new_map(config: Any) -> CellMap:
         """An empty map of the SLAM's own."""
+
+    def _believe(self, match: Callable[[Observations, Prediction, CellMap], Match]) -> None:
+        """``match`` matches a scan to the map, or to a copy of it."""
+        usual, agreement = self._matcher.usual, self._standing.agreement
+        self._belief = Belief(self.config, self._matcher, match, usual, agreement)
 
     def _new_submap(self) -> CellMap:
         """An empty map for what the key frames of a loop saw."""
@@ -94,8 +98,7 @@ class Tracker(abc.ABC):
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
         judged = self._judge(observations, prediction)  # 3 Eq. (13), and whether it is believed
-        evidence = self._compare(observations, judged)  # 4 residuals
-        self._update_map(observations, judged)  # 5 Eq. (8)
+        evidence = self._update_map(observations, judged)  # 4 residuals, then 5 Eq. (8)
         trust = self._update_uncertainty(observations, judged, evidence)  # 6 pose, odometry noise
         self._add_to_path(observations, judged)  # 7 key frames for loops
         match, state = judged.match, judged.state
@@ -112,7 +115,7 @@ class Tracker(abc.ABC):
         first_s = self.config.map.first_look_s
         self.cell_map.integrate(observations.view, T_map_laser, first_s, write=True)
         match = unmatched(np.zeros(3), matched=1.0, score=0.0)
-        self._loops.add(0, match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
+        self._loops.add(match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         return self._report(frame, match, self._belief.first(observations))
 
@@ -124,7 +127,7 @@ class Tracker(abc.ABC):
         self._path.moved_by = np.zeros(3)
         if not self._belief.certain:
             return
-        error = self._loops.map_error(len(self._path) - 1)
+        error = self._loops.map_error()
         if error is not None:
             self._pose_covariance.known(error)
         self._loops.work()
@@ -167,47 +170,39 @@ class Tracker(abc.ABC):
             self._pose_covariance.relocated(coarse(relocalise))
         return judged
 
-    def _match(
-        self, observations: Observations, prediction: Prediction, cell_map: CellMap
-    ) -> Match:
-        """By scan matching, to the map or to a copy of it."""
-        return self._matcher.match(cell_map, observations, prediction)
+    def _update_map(self, observations: Observations, judged: Judged) -> Evidence | None:
+        """Let the map see the frame, where the pose is believed.
 
-    def _compare(self, observations: Observations, judged: Judged) -> Evidence | None:
-        """What the observed surfaces say about the pose, before the map takes them in."""
-        if judged.state is not State.TRACKING:
-            return None
-        short_term, match = self._matcher.reward.short_term, judged.match
-        step = min(judged.prediction.elapsed, self.config.map.longest_look_s)
-        times, turn = (step, self._pose_covariance.unseen_s), len(self._path)
-        return look(self.cell_map, short_term, observations, match.T_map_robot, times, turn)
-
-    def _update_map(self, observations: Observations, judged: Judged) -> None:
-        """Let the map see the frame, where the pose is believed."""
+        Returns what the observed surfaces said about it before, where the robot was tracked to it.
+        """
         if not judged.writes:
-            return
-        T_map_robot = judged.match.T_map_robot
+            return None
+        T_map_robot, evidence = judged.match.T_map_robot, None
+        step = min(judged.prediction.elapsed, self.config.map.longest_look_s)
+        if judged.state is State.TRACKING:
+            short_term, turn = self._matcher.reward.short_term, self._loops.n_frames
+            times = step, self._pose_covariance.unseen_s
+            evidence = look(self.cell_map, short_term, observations, T_map_robot, times, turn)
         rasterise(self.cell_map, observations, T_map_robot)
         T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
-        step = min(judged.prediction.elapsed, self.config.map.longest_look_s)
         seen = self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
         if judged.state is State.TRACKING:
             self._belief.learn(observations, judged, seen)
+        return evidence
 
     def _update_uncertainty(
         self, observations: Observations, judged: Judged, evidence: Evidence | None
     ) -> float:
         """Returns how far the matched returns are trusted, in [0, 1]."""
         match, prediction = judged.match, judged.prediction
-        self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
-        agreement, dragged = self._standing.agreement, 0.0
+        agreement, dragged, now = self._standing.agreement, 0.0, None
         if match.slipped:  # found by a search, among what does not fit there
-            found = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
-            self._pose_covariance.dragged(found)
+            lasting = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
         else:
             dragged = agreement.dragged(observations.mean_vote)
-            left_behind = agreement.left_behind(dragged)
-            self._pose_covariance.dragged(left_behind, agreement.covariance(dragged))
+            lasting, now = agreement.left_behind(dragged), agreement.covariance(dragged)
+        self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
+        self._pose_covariance.dragged(lasting, now)
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
             self._odometry_noise.note_slip(prediction, match)
         else:
@@ -236,11 +231,11 @@ class Tracker(abc.ABC):
         self._trusted = found or state is State.TRACKING
         covariance = turned(covariance, -float(self._T_map_robot[2]))
         everyone = observations.with_votes(None)
+        written = state is State.TRACKING or (found and judged.writes)
+        elapsed, T_map_robot = prediction.elapsed, match.T_map_robot
         self._loops.add(
-            len(self._path), match.T_map_robot, motion, covariance, everyone,
-            elapsed=prediction.elapsed, found=found,
-            written=state is State.TRACKING or (found and judged.writes),
-        )  # fmt: skip
+            T_map_robot, motion, covariance, everyone, elapsed=elapsed, written=written, found=found
+        )
 
     def _report(
         self, frame: Frame, match: Match, state: State, trust: float = 1.0,
@@ -251,7 +246,7 @@ class Tracker(abc.ABC):
         self._before, self._T_map_robot = frame.odometry, match.T_map_robot
         T_map_robot = match.T_map_robot if elsewhere is None else elsewhere
         alert_m = self.config.standing.alert_m
-        p_lost = 1.0 - (1.0 - belief.p_lost) * (1.0 - sure.p_off(alert_m))
+        p_lost = 1.0 - (1.0 - belief.p_lost) * (1.0 - sure.p_off)
         lost = p_lost >= 0.5 and belief.status is not Status.BLIND
         doubtful = 0.0 < alert_m < 3.0 * sure.by_movers_m
         self._path.add(frame.stamp_ns, match.T_map_robot, elsewhere)

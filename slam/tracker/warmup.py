@@ -27,13 +27,8 @@ from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.recent import Standing
-from slam.tracker.uncertainty.covariances import (
-    advance,
-    carried,
-    innovation,
-    observable,
-    root_share,
-)
+from slam.tracker.uncertainty.covariances import advance, carried, observable, root_share
+from slam.tracker.uncertainty.odometry_noise import innovation
 from slam.tracker.uncertainty.residuals import look
 
 

@@ -17,7 +17,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam._jit import njit
 from slam.frames import Float
-from slam.frontend import odometry_steps
+from slam.frontend import odometry_prior
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.tracker.cell_map import CellMap
@@ -136,7 +136,7 @@ def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
 def near(match: Match, prediction: Prediction) -> Match:
     """The match, or odometry alone where rounding has carried it past all places and numbers."""
     off = np.abs(match.T_map_robot - prediction.T_map_robot)
-    if off.max() <= odometry_steps.MOST_STEP_M and np.isfinite(match.information).all():
+    if off.max() <= odometry_prior.MOST_STEP_M and np.isfinite(match.information).all():
         return match
     return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
 
@@ -215,7 +215,7 @@ class Matcher:
         self.usual = Usual(config.matching.usual)
         self._around = Around(self.reward.short_term)
 
-    def match(self, cell_map: CellMap, observations: Observations, prediction: Prediction) -> Match:
+    def match(self, observations: Observations, prediction: Prediction, cell_map: CellMap) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little."""
         predicted, prior = prediction.T_map_robot, prediction.prior
         precision = inverted(prior)

@@ -41,13 +41,15 @@ class KeyFrame:
 class KeyFrames:
     """Collects key frames from the motions between frames.
 
-    slack  (3, 3) that is added to each step's covariance
+    slack     (3, 3) that is added to each step's covariance
+    n_frames  frames so far
     """
 
     def __init__(self, config: LoopsConfig) -> None:
         self._config = config
         self.slack = spread(config.slack_m, config.slack_rad)
         self.keys: list[KeyFrame] = []
+        self.n_frames = 0
         self.way_m, self.elapsed_s = 0.0, 0.0
         self._step: Float = np.zeros(3)
         self._covariance: Float = np.zeros((3, 3))
@@ -58,7 +60,6 @@ class KeyFrames:
 
     def add(  # noqa: PLR0913 (the facts of one frame)
         self,
-        frame: int,
         T_map_robot: Float,
         motion: Float,
         covariance: Float,
@@ -80,6 +81,7 @@ class KeyFrames:
         self.elapsed_s += elapsed
         moved = math.hypot(float(self._step[0]), float(self._step[1]))
         near = moved < self._config.key_m and abs(float(self._step[2])) < self._config.key_rad
+        frame, self.n_frames = self.n_frames, self.n_frames + 1
         if self.keys and near:
             return
         self._frames.append(frame)

@@ -116,13 +116,13 @@ class Loops(KeyFrames):
             self.keys[k] = replace(key, T_map_robot=after[k])
         return Correction(T_new_old=T_new_old, cell_map=redrawing.cell_map, poses=moved)
 
-    def map_error(self, frame: int) -> Float | None:
-        """(3, 3) by which the map is off here, where ``frame`` is a key frame and loops were
+    def map_error(self) -> Float | None:
+        """(3, 3) by which the map is off here, where the latest frame is a key frame and loops were
         weighed before it; else None: the error of the frame before has grown by what was driven.
 
         A corrected map may have moved its first key frame: by that it is off the known start, too.
         """
-        if not self._weighed or self.keys[-1].frame != frame:
+        if not self._weighed or self.keys[-1].frame != self.n_frames - 1:
             return None
         self._weighed, self._owed = False, self._cost(48)
         held = {

@@ -14,7 +14,7 @@ from slam.frontend.odometry_prior import SINGULAR
 
 
 @inner
-def _inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+def inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
     """Inverse of a symmetric positive definite (3, 3); of one that rounding left singular, without
     its correlations."""
     a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
@@ -47,7 +47,7 @@ def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.fl
 
 
 @inner
-def _sum(a: NDArray[np.float64], share: float, b: NDArray[np.float64]) -> NDArray[np.float64]:
+def plus(a: NDArray[np.float64], share: float, b: NDArray[np.float64]) -> NDArray[np.float64]:
     """a + share b."""
     out = np.empty((3, 3))
     for i in range(3):
@@ -141,9 +141,9 @@ def advance(  # noqa: C901, PLR0913 (kernel)
             drift[i, j] = moved[i, j]
     # odometry's: what the data leave of it
     _sandwich(F, blind, moved)
-    whole = _sum(moved, 1.0, prior)
-    _inverse(whole, precision)
-    _inverse(_sum(data, 1.0, precision), M)
+    whole = plus(moved, 1.0, prior)
+    inverse(whole, precision)
+    inverse(plus(data, 1.0, precision), M)
     for i in range(3):
         for j in range(3):
             N[i, j] = M[i, 0] * precision[0, j] + M[i, 1] * precision[1, j]
@@ -158,9 +158,9 @@ def advance(  # noqa: C901, PLR0913 (kernel)
     for i in range(3):
         for j in range(3):
             kept[i, j] = moved[i, j]
-    _inverse(prior, precision)
+    inverse(prior, precision)
     # the shared error, as far as the data decide over the time that it stays the same
-    _inverse(_sum(data, 1.0 / variances[2], precision), M)
+    inverse(plus(data, 1.0 / variances[2], precision), M)
     _sandwich(M, data, moved)
     for i in range(3):
         for j in range(3):
@@ -187,43 +187,3 @@ def carried(
     for i in range(2):
         T[i, 2] = T[i, 1] * motion[0] - T[i, 0] * motion[1]
     _sandwich(T, covariance, out)
-
-
-@njit
-def innovation(
-    stated: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    data: NDArray[np.float64],
-    off: NDArray[np.float64],
-    share: float,
-    across: tuple[float, float],
-) -> tuple[float, float, float, float, float]:
-    """What the correction ``off`` of a pose matched with ``prior`` says about what is ``stated``.
-
-    ``data`` is the information with which the match corrected, ``share`` how much of the variance
-    that claims it really has. The innovation e is what a match alone would have said: off = K e, so
-    e = off + R inv(P) off. Returns its NIS, its squares in position and heading, and the match's
-    variances there; of the position only along the unit vector ``across`` unless that is zero.
-    """
-    precision, R, S = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    _inverse(prior, precision)
-    _inverse(_sum(data, 1e-3, precision), R)
-    pulled, e = np.zeros(3), np.zeros(3)
-    for i in range(3):
-        for k in range(3):
-            pulled[i] += precision[i, k] * off[k]
-    for i in range(3):
-        e[i] = off[i]
-        for k in range(3):
-            e[i] += R[i, k] * pulled[k]
-    _inverse(_sum(stated, share, R), S)
-    nis = 0.0
-    for i in range(3):
-        for k in range(3):
-            nis += e[i] * S[i, k] * e[k]
-    x, y = across
-    place, variance = e[0] * e[0] + e[1] * e[1], R[0, 0] + R[1, 1]
-    if x != 0.0 or y != 0.0:
-        place = (x * e[0] + y * e[1]) ** 2
-        variance = x * x * R[0, 0] + 2.0 * x * y * R[0, 1] + y * y * R[1, 1]
-    return nis, place, e[2] * e[2], share * variance, share * R[2, 2]

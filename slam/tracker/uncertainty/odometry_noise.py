@@ -14,13 +14,16 @@ from dataclasses import replace
 from typing import Self
 
 import numpy as np
+from numpy.typing import NDArray
 
+from slam._jit import njit
 from slam.frames import Float, Odometry
-from slam.frontend.odometry_prior import HeadingBias, Prediction, predict, turned
+from slam.frontend.odometry_prior import HeadingBias, Prediction, predict, squared, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
-from slam.tracker.uncertainty.covariances import innovation
+from slam.tracker.uncertainty.covariances import inverse, plus
 
+SLIP = 12.0  # squared innovation of three numbers that noise exceeds in 0.7 %; set by hand
 SLIP_S = 0.2  # s that a slip lasts in the mean; set by hand: station, 0.6 rad in 0.6 s
 SLIP_STEP_S = 0.15  # s, longest step: slower scans see no slip twice
 
@@ -31,6 +34,46 @@ def _across(covariance: Float, across: tuple[float, float]) -> float:
     x, y = across
     variance: float = a + d if x == y == 0.0 else x * x * a + 2.0 * x * y * b + y * y * d
     return variance
+
+
+@njit
+def innovation(
+    stated: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    data: NDArray[np.float64],
+    off: NDArray[np.float64],
+    share: float,
+    across: tuple[float, float],
+) -> tuple[float, float, float, float, float]:
+    """What the correction ``off`` of a pose matched with ``prior`` says about what is ``stated``.
+
+    ``data`` is the information with which the match corrected, ``share`` how much of the variance
+    that claims it really has. The innovation e is what a match alone would have said: off = K e, so
+    e = off + R inv(P) off. Returns its NIS, its squares in position and heading, and the match's
+    variances there; of the position only along the unit vector ``across`` unless that is zero.
+    """
+    precision, R, S = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
+    inverse(prior, precision)
+    inverse(plus(data, 1e-3, precision), R)
+    pulled, e = np.zeros(3), np.zeros(3)
+    for i in range(3):
+        for k in range(3):
+            pulled[i] += precision[i, k] * off[k]
+    for i in range(3):
+        e[i] = off[i]
+        for k in range(3):
+            e[i] += R[i, k] * pulled[k]
+    inverse(plus(stated, share, R), S)
+    nis = 0.0
+    for i in range(3):
+        for k in range(3):
+            nis += e[i] * S[i, k] * e[k]
+    x, y = across
+    place, variance = e[0] * e[0] + e[1] * e[1], R[0, 0] + R[1, 1]
+    if x != 0.0 or y != 0.0:
+        place = (x * e[0] + y * e[1]) ** 2
+        variance = x * x * R[0, 0] + 2.0 * x * y * R[0, 1] + y * y * R[1, 1]
+    return nis, place, e[2] * e[2], share * variance, share * R[2, 2]
 
 
 class OdometryNoise:
@@ -108,9 +151,9 @@ class OdometryNoise:
         if match.tau == 0.0 or prediction.elapsed > SLIP_STEP_S:
             self.forget_slip()
             return
-        slipped, self._slips = self._slips, prediction.is_slip(match.T_map_robot)
+        off = prediction.off(match.T_map_robot)
+        slipped, self._slips = self._slips, squared(off, prediction.prior) > SLIP
         if slipped and self._slips:
-            off = prediction.off(match.T_map_robot)
             self._slip = self._slip + np.multiply.outer(off, off)
 
     def forget_slip(self) -> None:
@@ -130,12 +173,6 @@ class OdometryNoise:
         """
         off = prediction.off(match.T_map_robot)
         data = match.tau * match.information
-        if (
-            self.bias is not None and self._stated
-        ):  # an assumed variance says nothing of what is bias and what is chance
-            variances = float(prediction.covariance[2, 2]), float(prediction.prior[2, 2])
-            found_out = match.matched, float(off[2]), data
-            self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)
         share = min(match.tau * self.noise_share(sensor_sigma_m), 1.0)
         across = (0.0, 0.0) if along_rad is None else (-math.sin(along_rad), math.cos(along_rad))
         self.nis, *found = innovation(
@@ -162,3 +199,8 @@ class OdometryNoise:
             self._expected[k] = keep * self._expected[k] + weight * unit
             scale = float(self._squares[k]) / max(float(self._expected[k]), 1e-9)
             self.scales[k] = min(max(scale, self._least), config.most)
+        if self.bias is not None and self._stated:
+            # an assumed variance says nothing of what is bias and what is chance
+            variances = float(prediction.covariance[2, 2]), float(prediction.prior[2, 2])
+            found_out = match.matched, float(off[2]), data
+            self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)

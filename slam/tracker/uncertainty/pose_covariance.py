@@ -30,8 +30,10 @@ class PoseCovariance:
     """The covariance of the pose.
 
     covariance    (3, 3) of (x, y, theta) in the map frame; zero at the known start
+    shared_m2     m^2, variance of the residual that neighbouring points of a surface share
     newest_drift  (3, 3) what the latest frame added to the error of the map
     by_movers_m   deviation of the position by what movers may have carried map and robot off
+    p_off         probability that they carried them by more than ``standing.alert_m`` (Rayleigh)
     unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
                   the noise of their beams would
     unseen_s      s since all directions were observable, lost ones too; it fades once they are
@@ -53,21 +55,16 @@ class PoseCovariance:
         self._geometry: Float = np.zeros((3, 3))
         self._new_geometry = [0.0, 0.0, 0.0]
         self.unseen_s = 0.0
+        self.shared_m2 = numbers.usual_m**2
         self._feigned, self._weighed = 0.0, 0.0
         self._in_view, self._looks = 0.0, 0.0
         self._drift: Float = np.zeros((3, 3))
         self._blind: Float = np.zeros((3, 3))
         self._shared: Float = np.zeros((3, 3))
         self._by_movers: Float = np.zeros((3, 3))
-        self.by_movers_m = 0.0
+        self._alert_m = config.standing.alert_m
+        self.by_movers_m = self.p_off = 0.0
         self.loaded: Float | None = None
-
-    @property
-    def shared_m2(self) -> float:
-        """Variance, m^2, of the residual that neighbouring points of a surface share."""
-        # the usual one where nothing was seen for so long that the sums are used up
-        least = self._config.forgotten
-        return (max(self._products, 0.0) + least * self._config.usual_m**2) / (self._pairs + least)
 
     def relocated(self, covariance: Float) -> None:
         """Found again somewhere in the map, to within ``covariance`` (3, 3)."""
@@ -130,6 +127,9 @@ class PoseCovariance:
         self.unseen_s = (
             self.unseen_s + prediction.elapsed if self.unobservable else self.unseen_s * faded
         )
+        # the usual one where nothing was seen for so long that the sums are used up
+        shared = max(self._products, 0.0) + config.forgotten * config.usual_m**2
+        self.shared_m2 = shared / (self._pairs + config.forgotten)
         # by how much shared errors of surfaces average out less than in a whole room
         seen = self._in_view / max(self._looks, config.forgotten)
         fewer = max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
@@ -165,11 +165,8 @@ class PoseCovariance:
         if now is not None:
             self.covariance = self.covariance + now
         self.by_movers_m = _far(self._by_movers if now is None else self._by_movers + now)
-
-    def p_off(self, alert_m: float) -> float:
-        """Probability that movers carried map and robot off by more than ``alert_m`` (Rayleigh)."""
-        least = min(alert_m, self.by_movers_m)
-        return math.exp(-((alert_m / self.by_movers_m) ** 2)) if least > 0.0 else 0.0
+        least = min(self._alert_m, self.by_movers_m)
+        self.p_off = math.exp(-((self._alert_m / self.by_movers_m) ** 2)) if least > 0.0 else 0.0
 
     def turned(self, by: float) -> None:
         """The map frame was turned by ``by`` rad, and the robot with it."""

@@ -14,8 +14,7 @@ from slam import LaserSpec, create, se2
 from slam.errors import InvalidValueError
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import NS_PER_S, Features, Frame, Odometry
-from slam.frontend import odometry_steps
-from slam.frontend.odometry_prior import HeadingBias
+from slam.frontend.odometry_prior import HeadingBias, motion
 from slam.frontend.odometry_steps import MotionSum
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -93,11 +92,11 @@ def test_steps_are_those_of_se2_and_their_limit_is_told():
     before = Odometry(stamp_ns=0, T_odom_robot=[1.0, 2.0, 0.5])
     now = Odometry(stamp_ns=1, T_odom_robot=[2.0, 2.5, 1.0])
     np.testing.assert_array_equal(
-        odometry_steps.increment(before, now), se2.between(before.T_odom_robot, now.T_odom_robot)
+        motion(before, now), se2.between(before.T_odom_robot, now.T_odom_robot)
     )
     far = Odometry(stamp_ns=7, T_odom_robot=[1e308, -1e308, 1.0])
     with pytest.raises(InvalidValueError, match=r"at most 1000 m .* got \S+ m from 0 ns to 7 ns"):
-        odometry_steps.increment(before, far)
+        motion(before, far)
 
 
 @pytest.mark.parametrize("twist", [[1e4, 0.0, 0.0], [0.0, 0.0, -1e300]])

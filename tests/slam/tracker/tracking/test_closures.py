@@ -27,10 +27,10 @@ def test_a_match_along_a_bare_corridor_says_nothing_of_the_way(end_m: float, alo
     covariance = np.diag([SAID_M**2, SAID_M**2, SAID_RAD**2])
     closures = Closures(CONFIG, Matcher(CONFIG), lambda: Network(CONFIG), keys.keys)
     before = np.zeros(3)
-    for k, frame in enumerate(stream):
+    for frame in stream:
         assert frame.truth is not None
         motion = se2.between(before, frame.truth)
-        keys.add(k, frame.truth, motion, covariance, seen(frame))
+        keys.add(frame.truth, motion, covariance, seen(frame))
         before = frame.truth
     closures.chained.append(keys.keys[0].T_map_robot)
     for j in range(1, len(keys.keys)):

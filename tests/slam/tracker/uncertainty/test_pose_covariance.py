@@ -17,8 +17,8 @@ from slam.system import Estimate
 from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
-from slam.tracker.uncertainty.covariances import innovation, observable
-from slam.tracker.uncertainty.odometry_noise import OdometryNoise
+from slam.tracker.uncertainty.covariances import observable
+from slam.tracker.uncertainty.odometry_noise import OdometryNoise, innovation
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 from slam.tracker.uncertainty.residuals import Evidence, look
 from tests.world2d import Drive, World2D, arena, frames, laser, rectangle, wander
