@@ -33,8 +33,7 @@ from slam.tracker.config import TrackerConfig
 class Law(NamedTuple):
     """The constants of one update.
 
-    step        h, s: how long the present input acts on x
-    look        s: what this look adds to a trace's age
+    step        h, s: how long the present input acts on x, and what it adds to a trace's age
     pace        s: prior age of a trace, so that its first looks do not count fully
     oldest      s: age at which a trace stops growing stiffer
     decay       A, 1/s
@@ -47,7 +46,6 @@ class Law(NamedTuple):
     """
 
     step: float
-    look: float
     pace: float
     oldest: float
     decay: float
@@ -154,8 +152,8 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                     cells.x[slot, jj, ii] = x
                     if law.trace:
                         age = cells.age[slot, jj, ii]
-                        y = np.float32(y + (given - y) * law.look / (age + law.look + law.pace))
-                        age = np.float32(min(age + law.look, law.oldest))
+                        y = np.float32(y + (given - y) * law.step / (age + law.step + law.pace))
+                        age = np.float32(min(age + law.step, law.oldest))
                         if y < law.faded and given < law.unseen:
                             y, age = np.float32(0.0), np.float32(0.0)
                         cells.y[slot, jj, ii] = y
@@ -195,7 +193,6 @@ class Network(CellMap):
         numbers, pace = self.config.map, self.pace(step)
         law = Law(
             step=step,
-            look=step,
             pace=pace,
             oldest=numbers.oldest_paces * pace,
             decay=self.config.decay_per_s,
