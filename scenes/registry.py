@@ -1,14 +1,19 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Scenes by name: ``build("office", seed=3, n_people=0)``."""
+"""Scenes by name: ``build("office", seed=3, n_people=0)``.
+
+Ours are plans of ``scenes/plans`` with a table of ``ours.toml`` each; ``random-rooms`` draws its
+plan, in Python.
+"""
 
 import importlib
 import inspect
+import tomllib
 from collections.abc import Callable
+from inspect import Parameter, Signature
 from pathlib import Path
 from typing import TYPE_CHECKING, Any, TypeVar
 
 from scenes import SCAN_HEIGHT, is_file
-from scenes.ours import ROWS, recipe
 from slam.bounded import check_file
 from slam.errors import InvalidValueError, UnknownNameError, meant
 from slam.names import first_line, join_folders, refuse_code
@@ -19,8 +24,13 @@ if TYPE_CHECKING:  # both load MuJoCo, and names are checked before that
 Recipe = Callable[..., "Scene"]
 F = TypeVar("F", bound=Recipe)
 _recipes: dict[str, Recipe] = {}
+WALLS = ("visible", "none")
+_USUAL = {"walls": WALLS[0], "glass": False, "doors": "open"}
+_OURS: dict[str, dict[str, Any]] = tomllib.loads(
+    Path(__file__).with_name("ours.toml").read_text(encoding="utf-8")
+)
 _DRAWN = {"random-rooms": "scenes.random_rooms:random_rooms"}
-OWN = (*ROWS, *_DRAWN)
+OWN = (*_OURS, *_DRAWN)
 """This project's scenes; those in Python are imported when one is asked for."""
 
 
@@ -112,11 +122,50 @@ def _find(name: str) -> Recipe:
     check_name(name)
     if name in _recipes:
         return _recipes[name]
-    if name in ROWS:
-        return recipe(name)
+    if name in _OURS:
+        return _tabled(name)
     module, _, attribute = _DRAWN[name].partition(":")
     drawn: Recipe = getattr(importlib.import_module(module), attribute)
     return drawn
+
+
+def _tabled(name: str) -> Recipe:
+    """The recipe ``(seed, *, options) -> Scene`` of a table of ours."""
+    row = _OURS[name]
+    counts = {key: n for key, n in row.items() if key.startswith("n_")}
+    known = {**dict.fromkeys(counts), **{key: _USUAL[key] for key in _USUAL if key in row}}
+
+    def made(seed: int, **given: Any) -> "Scene":
+        return _filled(name, seed, {**known, **given})
+
+    options = [Parameter(key, Parameter.KEYWORD_ONLY, default=known[key]) for key in known]
+    made.__doc__ = row["about"]
+    made.__signature__ = Signature(  # type: ignore[attr-defined]
+        [Parameter("seed", Parameter.POSITIONAL_OR_KEYWORD), *options]
+    )
+    return made
+
+
+def _filled(name: str, seed: int, options: dict[str, Any]) -> "Scene":
+    from scenes.recipe import Draws, count, finish, furnished, planned
+    from slam.shaped import one_of, shaped
+
+    row = _OURS[name]
+    for key in options:
+        if key in row and key.startswith("n_"):
+            options[key] = count(key, options[key], row[key])
+    glass = shaped("glass", options.get("glass", False), bool)
+    hidden = one_of("walls", options.get("walls", WALLS[0]), WALLS) == "none"
+    plan = planned(
+        name, tuple(row.get("furniture", ())), glazed=tuple(row["glass"] if glass else ()),
+        hidden=hidden,
+    )  # fmt: skip
+    loads = {key[2:-1]: n for key, n in options.items() if key in ("n_pallets", "n_trolleys")}
+    builder = furnished(
+        plan, Draws(seed), options["n_chairs"], options["n_people"], options.get("doors", "open"),
+        loads,
+    )  # fmt: skip
+    return finish(builder, name, seed, options)
 
 
 def _load(entry: str) -> Recipe:
