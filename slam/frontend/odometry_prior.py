@@ -8,6 +8,7 @@ the heading; left in, it leads a robot astray as soon as the map shows little.
 
 import math
 from dataclasses import dataclass, field
+from functools import cached_property
 
 import numpy as np
 
@@ -182,7 +183,7 @@ class Prediction:
         """(3, 3) of the increment, as the matcher takes it."""
         return self.covariance + self.loosened
 
-    @property
+    @cached_property
     def prior(self) -> Float:
         """(3, 3) of the pose, as the matcher takes it."""
         return self.covariance + self.loosened + self.carried
