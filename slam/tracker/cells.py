@@ -121,12 +121,13 @@ def used(cells: Cells) -> int:
 def with_room(old: Cells) -> Cells:
     """More of what ran out: slots in the pool, or scratch for impressions.
 
-    The pool grows by a sixteenth, so that little of it is ever unused.
+    The pool grows by a sixteenth, so that little of it is ever unused; but by no less than a little
+    map has, which is drawn in a scan.
     """
     cells = old
     if old.counts[FREE_COUNT] == 0:
         slots = len(old.free)
-        more = max(32, slots // 16)
+        more = max(128, slots // 16)
         free = np.zeros(slots + more, np.int32)
         free[:more] = np.arange(slots + more - 1, slots - 1, -1)
         cells = cells._replace(
@@ -139,7 +140,7 @@ def with_room(old: Cells) -> Cells:
         )
         cells.counts[FREE_COUNT] = more
     if old.counts[TOUCHED_COUNT] == len(old.touched):
-        more = len(old.touched) // 8
+        more = len(old.touched)
         cells = cells._replace(
             impression=_longer(old.impression, more, 0),
             faced=_longer(old.faced, more, 0),
@@ -149,7 +150,10 @@ def with_room(old: Cells) -> Cells:
 
 
 def _longer(array: NDArray[Any], more: int, fill: float) -> NDArray[Any]:
-    return np.concatenate([array, np.full((more, *array.shape[1:]), fill, array.dtype)])
+    n = len(array)
+    longer = np.empty((n + more, *array.shape[1:]), array.dtype)
+    longer[:n], longer[n:] = array, fill
+    return longer
 
 
 def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
