@@ -197,6 +197,12 @@ class Grid(CellMap):
         other.log_odds = self.log_odds.copy()
         return other
 
+    def begun_like(self, other: CellMap | None) -> Self:
+        """With log-odds for as many blocks."""
+        begun = super().begun_like(other)
+        begun.log_odds = np.zeros_like(begun.cells.age)
+        return begun
+
     def grow(self) -> None:
         """Make room where a kernel ran out of it."""
         super().grow()

@@ -20,12 +20,14 @@ from slam.estimate import Raster
 from slam.frontend.visibility import View
 from slam.tracker.cells import (
     ANEW,
+    FIRST,
     SIDE,
     Cells,
     Look,
     forget_impressions,
     living,
     no_cells,
+    used,
     with_room,
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
@@ -46,6 +48,13 @@ class CellMap(abc.ABC):
         self.config = config
         self.cell = config.cell_m
         self.cells = no_cells()
+
+    def begun_like(self, other: CellMap | None) -> Self:
+        """This map, in which nothing lives yet, with room for as much as lives in another: growing
+        takes as long as drawing."""
+        if other is not None:
+            self.cells = no_cells(max(used(other.cells), FIRST), len(other.cells.touched))
+        return self
 
     def pace(self, step: float) -> float:
         """Prior age, s, of a cell whose looks are ``step`` s long: its first do not count fully."""

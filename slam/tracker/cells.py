@@ -20,7 +20,7 @@ SIDE = 8  # cells along a block's edge
 SHIFT, MASK = 3, 7  # i >> SHIFT is the block of cell i, i & MASK its place inside
 
 FREE_COUNT, TOUCHED_COUNT = 0, 1  # places in ``Cells.counts``
-_FIRST_SLOTS, _FIRST_TOUCHED, _FIRST_ACROSS = 64, 64, 64
+FIRST, _FIRST_ACROSS = 64, 64  # blocks that there is room for, and their directory's edge
 
 
 class Cells(NamedTuple):
@@ -94,9 +94,9 @@ def fresh(  # noqa: PLR0913 (kernel)
     return (float(now) - float(before)) / WHOLE
 
 
-def no_cells() -> Cells:
-    """A plane on which nothing lives yet."""
-    shape = (_FIRST_SLOTS, SIDE, SIDE)
+def no_cells(slots: int = FIRST, scratch: int = FIRST) -> Cells:
+    """A plane on which nothing lives yet, with room for so many blocks and impressions."""
+    shape, rows = (slots, SIDE, SIDE), (scratch, SIDE, SIDE)
     return Cells(
         directory=np.full((_FIRST_ACROSS, _FIRST_ACROSS), -1, np.int32),
         corner=np.array([-_FIRST_ACROSS // 2, -_FIRST_ACROSS // 2], np.int64),
@@ -104,12 +104,12 @@ def no_cells() -> Cells:
         y=np.zeros(shape, np.float32),
         age=np.zeros(shape, np.float32),
         facing=np.zeros(shape, np.uint8),
-        free=np.arange(_FIRST_SLOTS, dtype=np.int32)[::-1].copy(),
-        scratch_of=np.full(_FIRST_SLOTS, -1, np.int32),
-        impression=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.float32),
-        faced=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.uint8),
-        touched=np.zeros((_FIRST_TOUCHED, 4), np.int32),
-        counts=np.array([_FIRST_SLOTS, 0], np.int64),
+        free=np.arange(slots, dtype=np.int32)[::-1].copy(),
+        scratch_of=np.full(slots, -1, np.int32),
+        impression=np.zeros(rows, np.float32),
+        faced=np.zeros(rows, np.uint8),
+        touched=np.zeros((scratch, 4), np.int32),
+        counts=np.array([slots, 0], np.int64),
     )
 
 
@@ -121,13 +121,12 @@ def used(cells: Cells) -> int:
 def with_room(old: Cells) -> Cells:
     """More of what ran out: slots in the pool, or scratch for impressions.
 
-    The pool grows by a sixteenth, so that little of it is ever unused; but by no less than a little
-    map has, which is drawn in a scan.
+    The pool grows by a sixteenth, so that little of it is ever unused.
     """
     cells = old
     if old.counts[FREE_COUNT] == 0:
         slots = len(old.free)
-        more = max(128, slots // 16)
+        more = max(2 * FIRST, slots // 16)
         free = np.zeros(slots + more, np.int32)
         free[:more] = np.arange(slots + more - 1, slots - 1, -1)
         cells = cells._replace(
@@ -150,9 +149,10 @@ def with_room(old: Cells) -> Cells:
 
 
 def _longer(array: NDArray[Any], more: int, fill: float) -> NDArray[Any]:
-    n = len(array)
-    longer = np.empty((n + more, *array.shape[1:]), array.dtype)
-    longer[:n], longer[n:] = array, fill
+    longer = np.zeros((len(array) + more, *array.shape[1:]), array.dtype)
+    longer[: len(array)] = array
+    if fill:
+        longer[len(array) :] = fill
     return longer
 
 

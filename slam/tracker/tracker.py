@@ -6,7 +6,6 @@ from __future__ import annotations
 import abc
 from collections.abc import Mapping
 from dataclasses import replace
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -65,7 +64,7 @@ class Tracker(abc.ABC):
         self._standing = Standing(self.config.standing)
         usual, agreement = self._matcher.usual, self._standing.agreement
         self._belief = Belief(self.config, self._matcher, self._match, usual, agreement)
-        new_map = partial(self._new_map, self.config) if self.map_moves else None
+        new_map = self._map_anew if self.map_moves else None
         self._loops = Loops(self.config, self._matcher, self._new_submap, new_map)
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
@@ -74,6 +73,10 @@ class Tracker(abc.ABC):
     @abc.abstractmethod
     def _new_map(config: Any) -> CellMap:
         """An empty map of the SLAM's own."""
+
+    def _map_anew(self) -> CellMap:
+        """An empty map for what the present one has."""
+        return self._new_map(self.config).begun_like(self.cell_map)
 
     def _new_submap(self) -> CellMap:
         """An empty map for what the key frames of a loop saw."""
