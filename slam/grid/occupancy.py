@@ -276,8 +276,9 @@ class OccupancySlam(Tracker):
     def _new_map(config: OccupancyConfig) -> Grid:
         return Grid(config)
 
-    def _new_submap(self) -> Network:
-        return Network(self.config, lateral=False)
+    @classmethod
+    def _new_submap(cls, config: OccupancyConfig) -> Network:
+        return Network(config, lateral=False)
 
     def changes(self) -> None:
         """A grid has but one memory."""
