@@ -8,6 +8,7 @@ the heading; left in, it leads a robot astray as soon as the map shows little.
 
 import math
 from dataclasses import dataclass, field
+from typing import Any
 
 import numpy as np
 
@@ -170,6 +171,12 @@ class Prediction:
     loosened: Float = field(default_factory=lambda: np.zeros((3, 3)))
     slips: bool = False
     carried: Float = field(default_factory=lambda: np.zeros((3, 3)))
+
+    def changed(self, **fields: Any) -> "Prediction":
+        """``replace`` at a fifth of its time."""
+        other = object.__new__(type(self))
+        other.__dict__.update(self.__dict__, **fields)
+        return other
 
     @property
     def step(self) -> Float:

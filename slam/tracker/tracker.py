@@ -5,7 +5,6 @@ from __future__ import annotations
 
 import abc
 from collections.abc import Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -173,7 +172,7 @@ class Tracker(abc.ABC):
         relocalise = self.config.tracking.relocalise
         if observations.weight >= relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
-            prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
+            prediction = prediction.changed(carried=self._pose_covariance.odometry_part(motion))
         judged = self._belief.judge(self.cell_map, self._T_map_robot, observations, prediction)
         self.cell_map = judged.cell_map
         if judged.state is State.RELOCATED:
