@@ -76,16 +76,19 @@ def _field(  # noqa: C901, PLR0912 (kernel)
             if column < 0 or column >= columns or cells.directory[row, column] < 0:
                 continue
             for a in range(SIDE + 4):
-                for b in range(SIDE + 4):
-                    r, q = row + ((a - 2) >> SHIFT), column + ((b - 2) >> SHIFT)
-                    value = 0.0
+                r = row + ((a - 2) >> SHIFT)
+                for beside in (-1, 0, 1):  # a block: two of its columns, all, two
+                    first, last = max(beside * SIDE + 2, 0), min(beside * SIDE + 2, 4) + SIDE
+                    q, slot = column + beside, np.int32(-1)
                     if 0 <= r < rows and 0 <= q < columns:
                         slot = cells.directory[r, q]
+                    for b in range(first, last):
                         if slot >= 0:
                             y = cells.y[slot, (a - 2) & MASK, (b - 2) & MASK]
                             x = cells.x[slot, (a - 2) & MASK, (b - 2) & MASK]
-                            value = y + (1.0 - y) * short_term * x
-                    padded[a, b] = value
+                            padded[a, b] = y + (1.0 - y) * short_term * x
+                        else:
+                            padded[a, b] = 0.0
             for a in range(SIDE + 4):
                 for b in range(SIDE):
                     total = 0.0
