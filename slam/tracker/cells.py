@@ -126,7 +126,7 @@ def with_room(old: Cells) -> Cells:
     cells = old
     if old.counts[FREE_COUNT] == 0:
         slots = len(old.free)
-        more = max(2 * FIRST, slots // 16)
+        more = max(32, slots // 16)
         free = np.zeros(slots + more, np.int32)
         free[:more] = np.arange(slots + more - 1, slots - 1, -1)
         cells = cells._replace(
@@ -139,7 +139,7 @@ def with_room(old: Cells) -> Cells:
         )
         cells.counts[FREE_COUNT] = more
     if old.counts[TOUCHED_COUNT] == len(old.touched):
-        more = len(old.touched)
+        more = len(old.touched) // 8
         cells = cells._replace(
             impression=_longer(old.impression, more, 0),
             faced=_longer(old.faced, more, 0),
