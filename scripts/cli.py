@@ -10,7 +10,7 @@ from typing import Annotated
 import typer
 
 from scripts import interrupt
-from scripts.console import LogLines, console, fail, note
+from scripts.console import COMPILER, LogLines, console, fail, note
 from scripts.option_names import Verb
 from scripts.verbs.scene import scene
 from slam.errors import InvalidValueError, MissingPathError, MobiliaError, UnknownNameError
@@ -73,6 +73,7 @@ def options(
         format="%(message)s",
         handlers=[LogLines(console=console, show_path=False, show_time=False)],
     )
+    logging.getLogger(COMPILER).setLevel(logging.INFO)  # what nothing else is said of for long
     load(modules or ())
 
 

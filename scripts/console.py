@@ -28,6 +28,7 @@ from rich.text import Text
 
 from slam.errors import MobiliaError, printable
 
+COMPILER = "slam._jit"  # name of its log
 LINE_EVERY_S = 10.0  # between lines of progress where the output is no terminal
 console = Console(emoji=False)  # "seat:chair:0" is a mark, and no picture of a chair
 _errors = Console(stderr=True, emoji=False)
@@ -71,15 +72,17 @@ def say(words: str, *, highlight: bool = True) -> None:
 
 
 class LogLines(RichHandler):
-    """Log records as in rich, but a warning as one line, however narrow the terminal is."""
+    """Log records as in rich, but a warning, and that something is compiled, as one line, however
+    narrow the terminal is."""
 
     def emit(self, record: logging.LogRecord) -> None:
         """Print it."""
-        if record.levelno < logging.WARNING or record.exc_info:
+        warning, compiling = record.levelno >= logging.WARNING, record.name == COMPILER
+        if record.exc_info or not (warning or compiling):
             super().emit(record)
             return
-        words = plain(record.getMessage())
-        self.console.print(f"[yellow]warning:[/yellow] {words}", highlight=False, soft_wrap=True)
+        kind, words = "warning" if warning else "note", plain(record.getMessage())
+        self.console.print(f"[yellow]{kind}:[/yellow] {words}", highlight=False, soft_wrap=True)
 
 
 def fact(sentence: str, *, bad: bool = False) -> None:

@@ -152,13 +152,13 @@ COMPILING = "numba:compile"
 class _SayOnce(event.Listener):  # type: ignore[misc]  # numba has no types
     """Logs one line when a kernel is really compiled, none when it comes from the cache."""
 
-    def __init__(self, what: str) -> None:
-        self.what = what
+    def __init__(self, what: str, about_s: float) -> None:
+        self.what, self.about_s = what, about_s
         self.said = False
 
     def on_start(self, event: Any) -> None:
         if not self.said:
-            _log.info("compiling %s, which takes some seconds the first time", self.what)
+            _log.info("compiling %s, the first time only: about %.0f s", self.what, self.about_s)
         self.said = True
 
     def on_end(self, event: Any) -> None:
@@ -192,9 +192,9 @@ event.register(COMPILING, _Uncollected())
 
 
 @contextmanager
-def announced(what: str) -> Iterator[None]:
-    """Run the kernels of ``what`` for the first time in here."""
-    listener = _SayOnce(what)
+def announced(what: str, about_s: float) -> Iterator[None]:
+    """Run the kernels of ``what`` for the first time in here, which takes so long to compile."""
+    listener = _SayOnce(what, about_s)
     event.register(COMPILING, listener)
     try:
         yield

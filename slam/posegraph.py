@@ -9,7 +9,8 @@ all pull, then those that do not fit the others are let go of.
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from functools import cached_property
+from typing import Any, TypeAlias
 
 import numpy as np
 from numpy.typing import NDArray
@@ -18,12 +19,14 @@ from scipy.sparse.linalg import splu
 
 from slam import se2
 from slam.frames import Float
+from slam.frontend.odometry_prior import upper_inverted
 
 INLIER = 11.3  # chi squared of 3 degrees of freedom, 99 %
 ROUNDS = 60
 STILL = 1e-5  # m or rad: largest step at which it has converged
 SHARPER = 1.4
 _SYMMETRIC: Any = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
+Pose: TypeAlias = tuple[float, float, float]
 DIGITS = 6  # of m and rad that a solution has: those beyond follow the processor's algebra
 
 
@@ -39,6 +42,13 @@ class Edge:
     T_a_b: Float
     information: Float
     robust: bool = False
+
+    @cached_property
+    def numbers(self) -> tuple[Pose, tuple[float, float, float, float, float, float]]:
+        """``T_a_b``, and row by row the upper part of its covariance, in plain numbers."""
+        (a, b, c), (_, d, e), (_, _, f) = self.information.tolist()
+        x, y, turn = self.T_a_b.tolist()
+        return (x, y, turn), upper_inverted(a, b, c, d, e, f)
 
 
 class Relaxation:

@@ -219,7 +219,7 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         spec.angles,
         spec.beam_time_offsets,
         spec.T_robot_laser,
-        twist,
+        np.array(twist),  # one that is fixed would be compiled for once more
         (spec.range_min, spec.range_max, use, min(use, SILENT_M)),
         points,
         beams,

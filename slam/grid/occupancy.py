@@ -197,6 +197,12 @@ class Grid(CellMap):
         other.log_odds = self.log_odds.copy()
         return other
 
+    def begun_like(self, other: CellMap | None) -> Self:
+        """With log-odds for as many blocks."""
+        begun = super().begun_like(other)
+        begun.log_odds = np.zeros_like(begun.cells.age)
+        return begun
+
     def grow(self) -> None:
         """Make room where a kernel ran out of it."""
         super().grow()
@@ -270,8 +276,9 @@ class OccupancySlam(Tracker):
     def _new_map(config: OccupancyConfig) -> Grid:
         return Grid(config)
 
-    def _new_submap(self) -> Network:
-        return Network(self.config, lateral=False)
+    @classmethod
+    def _new_submap(cls, config: OccupancyConfig) -> Network:
+        return Network(config, lateral=False)
 
     def changes(self) -> None:
         """A grid has but one memory."""

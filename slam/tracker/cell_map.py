@@ -19,6 +19,7 @@ from slam.estimate import Raster
 from slam.frontend.visibility import View
 from slam.tracker.cells import (
     ANEW,
+    FIRST,
     FREE_COUNT,
     SIDE,
     TOUCHED_COUNT,
@@ -26,6 +27,7 @@ from slam.tracker.cells import (
     Look,
     living,
     no_cells,
+    used,
     with_room,
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
@@ -66,6 +68,13 @@ class CellMap(abc.ABC):
         self.config = config
         self.cell = config.cell_m
         self.cells = no_cells()
+
+    def begun_like(self, other: "CellMap | None") -> Self:
+        """This map, in which nothing lives yet, with room for as much as lives in another: growing
+        takes as long as drawing."""
+        if other is not None:
+            self.cells = no_cells(max(used(other.cells), FIRST), len(other.cells.touched))
+        return self
 
     def pace(self, step: float) -> float:
         """Prior age, s, of a cell whose looks are ``step`` s long: its first do not count fully."""

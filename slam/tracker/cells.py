@@ -18,7 +18,7 @@ SIDE = 8  # cells along a block's edge
 SHIFT, MASK = 3, 7  # i >> SHIFT is the block of cell i, i & MASK its place inside
 
 FREE_COUNT, TOUCHED_COUNT = 0, 1  # places in ``Cells.counts``
-_FIRST_SLOTS, _FIRST_TOUCHED, _FIRST_ACROSS = 64, 64, 64
+FIRST, _FIRST_ACROSS = 64, 64  # blocks that there is room for, and their directory's edge
 
 
 class Cells(NamedTuple):
@@ -92,9 +92,9 @@ def fresh(  # noqa: PLR0913 (kernel)
     return (float(now) - float(before)) / WHOLE
 
 
-def no_cells() -> Cells:
-    """A plane on which nothing lives yet."""
-    shape = (_FIRST_SLOTS, SIDE, SIDE)
+def no_cells(slots: int = FIRST, scratch: int = FIRST) -> Cells:
+    """A plane on which nothing lives yet, with room for so many blocks and impressions."""
+    shape, rows = (slots, SIDE, SIDE), (scratch, SIDE, SIDE)
     return Cells(
         directory=np.full((_FIRST_ACROSS, _FIRST_ACROSS), -1, np.int32),
         corner=np.array([-_FIRST_ACROSS // 2, -_FIRST_ACROSS // 2], np.int64),
@@ -102,12 +102,12 @@ def no_cells() -> Cells:
         y=np.zeros(shape, np.float32),
         age=np.zeros(shape, np.float32),
         facing=np.zeros(shape, np.uint8),
-        free=np.arange(_FIRST_SLOTS, dtype=np.int32)[::-1].copy(),
-        scratch_of=np.full(_FIRST_SLOTS, -1, np.int32),
-        impression=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.float32),
-        faced=np.zeros((_FIRST_TOUCHED, SIDE, SIDE), np.uint8),
-        touched=np.zeros((_FIRST_TOUCHED, 4), np.int32),
-        counts=np.array([_FIRST_SLOTS, 0], np.int64),
+        free=np.arange(slots, dtype=np.int32)[::-1].copy(),
+        scratch_of=np.full(slots, -1, np.int32),
+        impression=np.zeros(rows, np.float32),
+        faced=np.zeros(rows, np.uint8),
+        touched=np.zeros((scratch, 4), np.int32),
+        counts=np.array([slots, 0], np.int64),
     )
 
 
@@ -147,7 +147,11 @@ def with_room(old: Cells) -> Cells:
 
 
 def _longer(array: NDArray[Any], more: int, fill: float) -> NDArray[Any]:
-    return np.concatenate([array, np.full((more, *array.shape[1:]), fill, array.dtype)])
+    longer = np.zeros((len(array) + more, *array.shape[1:]), array.dtype)
+    longer[: len(array)] = array
+    if fill:
+        longer[len(array) :] = fill
+    return longer
 
 
 def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:

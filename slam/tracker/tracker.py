@@ -3,7 +3,6 @@
 
 import abc
 from collections.abc import Callable, Mapping
-from dataclasses import replace
 from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Self
@@ -48,9 +47,14 @@ class Tracker(abc.ABC):
 
     def __init__(self, config: TrackerConfig | str | Mapping[str, Any] = "robust") -> None:
         self.config = self.config_class.of(config)
-        # mypy takes a class of dataclasses for unhashable
-        warm_up(self.config_class, self._new_map)  # type: ignore[arg-type]
+        self._get_ready()
         self.reset()
+
+    @classmethod
+    def _get_ready(cls) -> None:
+        """Compile, the first time in a process."""
+        # mypy takes a class of dataclasses for unhashable
+        warm_up(cls.config_class, cls._new_map, cls._new_submap)  # type: ignore[arg-type]
 
     def reset(self) -> None:
         """Forget everything; the next frame is the origin of the map."""
@@ -62,8 +66,9 @@ class Tracker(abc.ABC):
         self._odometry_noise = OdometryNoise.of_beams(self.config)
         self._standing = Standing(self.config.standing)
         self._believe(self._matcher.match)
-        new_map = partial(self._new_map, self.config) if self.map_moves else None
-        self._loops = Loops(self.config, self._matcher, self._new_submap, new_map)
+        new_map = self._map_anew if self.map_moves else None
+        new_submap = partial(self._new_submap, self.config)
+        self._loops = Loops(self.config, self._matcher, new_submap, new_map)
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
 
@@ -77,9 +82,14 @@ class Tracker(abc.ABC):
         usual, agreement = self._matcher.usual, self._standing.agreement
         self._belief = Belief(self.config, self._matcher, match, usual, agreement)
 
-    def _new_submap(self) -> CellMap:
+    def _map_anew(self) -> CellMap:
+        """An empty map for what the present one has."""
+        return self._new_map(self.config).begun_like(self.cell_map)
+
+    @classmethod
+    def _new_submap(cls, config: Any) -> CellMap:
         """An empty map for what the key frames of a loop saw."""
-        return self._new_map(self.config)
+        return cls._new_map(config)
 
     def update(self, frame: Frame) -> Estimate:
         """One frame in seven steps: from odometry and scan to pose, covariance and map.
@@ -163,7 +173,7 @@ class Tracker(abc.ABC):
         relocalise = self.config.tracking.relocalise
         if observations.weight >= relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
-            prediction = replace(prediction, carried=self._pose_covariance.odometry_part(motion))
+            prediction = prediction.changed(carried=self._pose_covariance.odometry_part(motion))
         judged = self._belief.judge(self.cell_map, self._T_map_robot, observations, prediction)
         self.cell_map = judged.cell_map
         if judged.state is State.RELOCATED:
@@ -333,7 +343,7 @@ class Tracker(abc.ABC):
             raise LogFormatError(path, f"a map of {state.kind}, not of {cls.__name__}")
         slam = cls.__new__(cls)
         slam.config = config
-        warm_up(cls.config_class, cls._new_map)  # type: ignore[arg-type]
+        cls._get_ready()
         slam.reset()
         try:
             memory.fill(slam.cell_map, arrays)

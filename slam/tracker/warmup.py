@@ -31,24 +31,26 @@ from slam.tracker.uncertainty.covariances import advance, carried, observable, r
 from slam.tracker.uncertainty.odometry_noise import innovation
 from slam.tracker.uncertainty.residuals import look
 
+COMPILE_S = 10.0  # of one core of a Xeon, measured
+
 
 @functools.cache
-def warm_up(config_class: type[TrackerConfig], new_map: Callable[[Any], CellMap]) -> None:
+def warm_up(config_class: type[TrackerConfig], *new_maps: Callable[[Any], CellMap]) -> None:
     """Run every kernel of an ordinary scan once on a little room, the first time in a process.
 
-    ``new_map`` makes the map of a SLAM, whose own kernels run as well.
+    ``new_maps`` make the map of a SLAM, and those of its loops, whose own kernels run as well.
     """
-    with announced("the SLAM's kernels"):
-        _run_all(config_class(cell_m=0.2), new_map)
+    with announced("the SLAM's kernels", COMPILE_S):
+        config = config_class(cell_m=0.2)
+        _run_all(config, *(new_map(config) for new_map in new_maps))
     gc.collect()
     gc.freeze()  # the compiler's objects stay: looking through them again takes 100 ms of a scan
 
 
-def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:
+def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None:
     spec = LaserSpec(n_beams=9, angle_min=-1.0, angle_increment=0.25)
     ranges = np.array([2.0, 2.0, 2.0, 1.0, 3.0, 3.0, 2.0, 2.0, np.inf], np.float32)
-    cell_map, matcher = new_map(config), Matcher(config)
-    origin, covariance = np.zeros(3), np.diag([0.1, 0.1, 0.1])
+    matcher, origin, covariance = Matcher(config), np.zeros(3), np.diag([0.1, 0.1, 0.1])
     seen = from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), config)
     look(cell_map, 0.3, seen, origin, (1.0, 0.0), 0)
     whole = [np.eye(3) for _ in range(4)]
@@ -67,9 +69,10 @@ def _run_all(config: TrackerConfig, new_map: Callable[[Any], CellMap]) -> None:
     carried(covariance, origin, 0.0, 0.0, np.eye(3))
     observable(covariance, 0.0, 2.0, np.eye(3))
     innovation(covariance, covariance, covariance, origin, 1.0, (0.0, 0.0))
-    for write in (False, True):
-        rasterise(cell_map, seen, origin)
-        cell_map.integrate(seen.view, origin, 1.0, write=write)
+    for one in (cell_map, *others):
+        for write in (False, True):
+            rasterise(one, seen, origin)
+            one.integrate(seen.view, origin, 1.0, write=write)
     standing = Standing(StandingConfig(thin_m=0.0))
     standing.add(0, origin, seen)
     standing.with_votes(NS_PER_S // 2, origin, covariance, seen)

@@ -2,6 +2,7 @@
 """What is printed where nobody sees a progress bar."""
 
 import io
+import logging
 import time
 
 import pytest
@@ -82,3 +83,11 @@ def test_what_was_there_before_is_not_of_the_pace():
 def test_a_file_s_name_is_no_order_to_the_terminal(printed: io.StringIO, say):
     say("a\x1b[2J\u202e[bold]b")
     assert "a\\x1b[2J\\u202e[bold]b\n" in printed.getvalue()
+
+
+def test_that_something_is_compiled_is_a_note_of_one_line(printed: io.StringIO):
+    record = logging.LogRecord(
+        console.COMPILER, logging.INFO, "", 0, "compiling %s: %d s", ("a", 10), None
+    )
+    console.LogLines(console=console.console).handle(record)
+    assert printed.getvalue() == "note: compiling a: 10 s\n"

@@ -107,13 +107,13 @@ def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptu
         return 2 * x
 
     with caplog.at_level(logging.INFO, logger="slam._jit"):
-        with announced("the test's kernel"):
+        with announced("the test's kernel", 2.0):
             assert twice(2) == 4
             assert twice(0.5) == 1.0  # compiled again, for another type
         assert [r.message for r in caplog.records] == [
-            "compiling the test's kernel, which takes some seconds the first time"
+            "compiling the test's kernel, the first time only: about 2 s"
         ]
-        with announced("the test's kernel"):
+        with announced("the test's kernel", 2.0):
             twice(3)
         assert len(caplog.records) == 1
 

@@ -138,12 +138,16 @@ def _bound(
     bounds: NDArray[np.float64],
 ) -> None:
     """Upper bounds (headings, rows, columns) of the blocks of offsets."""
+    columns, cells = ahead.shape[1], ahead.ravel()  # places as in ``open_block``
+    flat = np.empty(bases.shape[1], np.uint64)
     for h in range(bounds.shape[0]):
+        for k in range(len(flat)):
+            flat[k] = bases[h, k, 1] * columns + bases[h, k, 0]
         for a in range(bounds.shape[1]):
             for b in range(bounds.shape[2]):
-                di, dj, total = b * SPAN - reach, a * SPAN - reach, 0
-                for k in range(bases.shape[1]):
-                    total += ahead[bases[h, k, 1] + dj, bases[h, k, 0] + di]
+                first, total = np.uint64((a * SPAN - reach) * columns + b * SPAN - reach), 0
+                for k in range(len(flat)):
+                    total += cells[flat[k] + first]
                 bounds[h, a, b] = gain * total - costs[h]
 
 

@@ -14,11 +14,11 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import announced, njit
+from slam._jit import njit
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, no_cells
+from slam.tracker.cells import MASK, SHIFT, SIDE, Cells
 from slam.tracker.matching.branch_and_bound import SPAN, Lattice, best_of, look_ahead
 from slam.tracker.matching.config import LocalConfig
 
@@ -74,16 +74,19 @@ def _field(  # noqa: C901, PLR0912 (kernel)
             if column < 0 or column >= columns or cells.directory[row, column] < 0:
                 continue
             for a in range(SIDE + 4):
-                for b in range(SIDE + 4):
-                    r, q = row + ((a - 2) >> SHIFT), column + ((b - 2) >> SHIFT)
-                    value = 0.0
+                r = row + ((a - 2) >> SHIFT)
+                for beside in (-1, 0, 1):  # a block: two of its columns, all, two
+                    first, last = max(beside * SIDE + 2, 0), min(beside * SIDE + 2, 4) + SIDE
+                    q, slot = column + beside, np.int32(-1)
                     if 0 <= r < rows and 0 <= q < columns:
                         slot = cells.directory[r, q]
+                    for b in range(first, last):
                         if slot >= 0:
                             y = cells.y[slot, (a - 2) & MASK, (b - 2) & MASK]
                             x = cells.x[slot, (a - 2) & MASK, (b - 2) & MASK]
-                            value = y + (1.0 - y) * short_term * x
-                    padded[a, b] = value
+                            padded[a, b] = y + (1.0 - y) * short_term * x
+                        else:
+                            padded[a, b] = 0.0
             for a in range(SIDE + 4):
                 for b in range(SIDE):
                     total = 0.0
@@ -127,26 +130,11 @@ def _kernel(sigma: float) -> Float:
     return taps / math.sqrt(math.pi * sigma**2)
 
 
-@functools.cache
-def _get_ready() -> None:
-    """Run every kernel of a search once, the first time in a process."""
-    with announced("the kernels of the wide search"):
-        field, bases = np.zeros((2 * SIDE, 2 * SIDE), np.uint8), np.empty((1, 1, 2), np.int32)
-        _field(no_cells(), 0.3, 0, 0, _kernel(1.0), field)
-        place(np.ones((1, 2)), np.zeros(3), np.zeros(1), 0.2, 0, 0, bases)
-        lattice = Lattice(
-            field=field, ahead=field, bases=bases, turns=np.zeros(1), reach=1, pitch=0.2,
-            precision=np.eye(3), gain=1.0,
-        )  # fmt: skip
-        best_of(lattice)
-
-
 def field_of(
     cell_map: CellMap, short_term: float, i0: int, j0: int, field: NDArray[np.uint8]
 ) -> NDArray[np.uint8]:
     """``field``, which is all 0, filled with smoothed activities from cell (i0, j0) on, which
     begins a block."""
-    _get_ready()
     sigma = cell_map.config.frontend.sigma_cells
     _field(cell_map.cells, short_term, i0, j0, _kernel(sigma), field)
     return field

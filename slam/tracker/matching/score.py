@@ -108,7 +108,7 @@ def _bell(a: float, b: float, d: float, tail: float, tail_cells: float) -> Bell:
 
 
 @inner
-def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
+def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
     field: Field,
     short_term: float,
     closed: float,
@@ -129,7 +129,7 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
     j0, j1 = math.ceil(v - high), math.floor(v + high)
     weight = math.exp(-0.5 * (j0 - v) * (j0 - v) / d)  # of a row: exp(-dv^2 / 2 d),
     climb = math.exp(-(j0 - v + 0.5) / d)  # by recurrence: no exp in the loops
-    i0, i1, t, first, second = 0, 0, 0.0, 0.0, 0.0
+    i0, i1, t, first, second, begun = 0, 0, 0.0, 0.0, 0.0, False
     m0 = mu = mv = muu = muv = mvv = 0.0
     rows, columns = field.directory.shape
     for j in range(j0, j1 + 1):
@@ -137,32 +137,47 @@ def _overlap(  # noqa: PLR0913, PLR0915 (kernel)
         shift = lean * dv
         if j == j0 or lean != 0.0:
             i0, i1 = math.ceil(u + shift - wide), math.floor(u + shift + wide)
-            t = i0 - u - shift
-            first, second = math.exp(-0.5 * pa * t * t), math.exp(-pa * (t + 0.5))
+            begun = False
         row = (j >> SHIFT) - field.corner[1]
+        left, right = 0, -1  # the columns of blocks that live
         if 0 <= row < rows:
+            left = max((i0 >> SHIFT) - field.corner[0], 0)
+            right = min((i1 >> SHIFT) - field.corner[0], columns - 1)
+            while left <= right and field.directory[row, left] < 0:
+                left += 1
+        if left <= right:
+            if not begun:
+                t, begun = i0 - u - shift, True
+                first, second = math.exp(-0.5 * pa * t * t), math.exp(-pa * (t + 0.5))
             s0 = s1 = s2 = 0.0
             offset, kernel, ratio = t, first, second
-            column_before, slot = -1, -1
-            for i in range(i0, i1 + 1):
-                column = (i >> SHIFT) - field.corner[0]
-                if column != column_before:
-                    column_before = column
-                    slot = field.directory[row, column] if 0 <= column < columns else -1
-                if slot >= 0:
+            i = i0
+            for column in range(left, right + 1):
+                start = max((column + field.corner[0]) << SHIFT, i0)
+                end = min((column + field.corner[0] + 1) << SHIFT, i1 + 1)
+                slot = field.directory[row, column]
+                if slot < 0:
+                    continue
+                while i < start:
+                    kernel *= ratio
+                    ratio *= falling
+                    offset += 1.0
+                    i += 1
+                while i < end:
                     x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
-                    if x + y > 0.0 and not opposite(faced, field.facing[slot, j & MASK, i & MASK]):
-                        value = y + (1.0 - y) * short_term * x
-                        if closed > 0.0:
-                            value -= closed * y * (1.0 - y)
-                        value *= kernel
-                        s0 += value
-                        value *= offset
-                        s1 += value
-                        s2 += value * offset
-                kernel *= ratio
-                ratio *= falling
-                offset += 1.0
+                    value = y + (1.0 - y) * short_term * x
+                    value -= closed * y * (1.0 - y)
+                    if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
+                        value = 0.0
+                    value *= kernel
+                    s0 += value
+                    value *= offset
+                    s1 += value
+                    s2 += value * offset
+                    kernel *= ratio
+                    ratio *= falling
+                    offset += 1.0
+                    i += 1
             s2 = weight * (s2 + shift * (2.0 * s1 + shift * s0))
             s1 = weight * (s1 + shift * s0)
             s0 *= weight

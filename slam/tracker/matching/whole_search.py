@@ -17,7 +17,7 @@ from slam.tracker.matching.config import GlobalConfig
 from slam.tracker.matching.local_search import place
 from slam.tracker.matching.planes import LARGE, SPAN, Queue, bound_blocks, flatten, open_nodes
 
-FIRST_ROOM = 1 << 12  # nodes of the heap at first
+FIRST_ROOM = 1 << 17  # nodes of the heap at first
 BINS = 1 << 12  # of bounds
 BATCH = 1 << 13  # blocks that are queued at a time, at least
 SORTED = 50  # times the price of a block that is passed over: one that is queued
@@ -160,7 +160,8 @@ class WholeSearch:
             if self._state == planes.MORE and queue.counts[planes.SIZE] + planes.ROOM > len(
                 queue.heap
             ):
-                heap = np.concatenate([queue.heap, np.empty_like(queue.heap)])
+                heap = np.empty((2 * len(queue.heap), 2), np.int64)
+                heap[: len(queue.heap)] = queue.heap  # the rest is no memory until it is used
                 self._queue = queue._replace(heap=heap)
 
     def _opened(self, queue: Queue, nodes: int) -> int:

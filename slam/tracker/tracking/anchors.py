@@ -15,13 +15,13 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
-from slam.frontend.odometry_prior import upper_inverted
-from slam.posegraph import Edge
+from slam.posegraph import Edge, Pose
 from slam.tracker.tracking.keys import KeyFrame
 
+UPPER = [0, 1, 2, 4, 5, 8]  # of (3, 3), row by row; ``WHOLE``: places in these six
+WHOLE = [0, 1, 2, 1, 3, 4, 2, 4, 5]
 LEVER_M = 5.0  # an error of the heading counts as what it does to a place so far away
 
-Pose: TypeAlias = tuple[float, float, float]
 Upper: TypeAlias = tuple[float, float, float, float, float, float]  # of (3, 3), row by row
 
 
@@ -31,8 +31,8 @@ def map_errors(
     closures: Mapping[tuple[int, int], Edge],
     slack: Float,
     found: Float,
-) -> list[Float]:
-    """(3, 3) of each key frame: what its pose in the map is off, in the map frame.
+) -> Float:
+    """(n, 3, 3) of each key frame: what its pose in the map is off, in the map frame.
 
     graph     poses (3,) of the key frames by the pose graph
     closures  by their key frames
@@ -44,14 +44,15 @@ def map_errors(
     ending: dict[int, list[Edge]] = {}
     for pair, edge in sorted(closures.items()):
         ending.setdefault(max(pair), []).append(edge)
-    poses: list[Pose] = [tuple(key.T_map_robot.tolist()) for key in keys]
-    solved: list[Pose] = [tuple(pose.tolist()) for pose in graph]
+    poses: list[Pose] = np.array([key.T_map_robot for key in keys]).tolist()
+    solved: list[Pose] = np.array(graph).tolist()
+    steps = (np.array([key.covariance for key in keys]) - slack).reshape(-1, 9)[:, UPPER].tolist()
     errors: list[Upper] = [(0.0,) * 6]
     driven, T_map_graph = errors[0], _moved(poses[0], solved[0])
     known, elsewhere = 0, False  # the last key frame that the map took in; found elsewhere since
     for k in range(1, len(keys)):
         before, here = poses[k - 1], poses[k]
-        step = _turned(_upper(keys[k].covariance - slack), before[2])
+        step = _turned(steps[k], before[2])
         driven = _sum(_after(driven, before, here), step)
         torn = _off(here, _composed(T_map_graph, solved[k]))
         elsewhere = elsewhere or keys[k].found
@@ -61,17 +62,20 @@ def map_errors(
             known, elsewhere = k, False
         best = _sum(driven, _square(torn))
         for edge in ending.get(k, ()):
-            a, b = poses[edge.a], poses[edge.b]
-            off = _off(b, _composed(a, edge.T_a_b.tolist()))  # what the map denies of it
-            own = _turned(upper_inverted(*_upper(edge.information)), a[2])
             first = min(edge.a, edge.b)
-            closed = _after(_sum(own, _square(off)), b, here)
-            closed = _sum(_after(errors[first], poses[first], here), closed)
+            closed = _after(errors[first], poses[first], here)
+            if _size(closed) >= _size(best):
+                continue  # the closure only adds to it
+            a, b = poses[edge.a], poses[edge.b]
+            measured, own = edge.numbers
+            off = _off(b, _composed(a, measured))  # what the map denies of it
+            own = _sum(_turned(own, a[2]), _square(off))
+            closed = _sum(closed, _after(own, b, here))
             if _size(closed) < _size(best):
                 best = driven = closed
                 T_map_graph = _moved(here, solved[k])
         errors.append(best)
-    return [np.array([[a, b, c], [b, d, e], [c, e, f]]) for a, b, c, d, e, f in errors]
+    return np.array(errors)[:, WHOLE].reshape(-1, 3, 3)
 
 
 def _composed(T: Pose, pose: Pose) -> Pose:

@@ -80,6 +80,7 @@ class Closures:
         self._room_m = 2.0 * config.loops.widest_m + config.loops.near_m
         self._submaps: dict[int, CellMap] = {}  # those used last, the latest at the end
         self._coarse_map: tuple[int, CoarseMap] | None = None  # of the one searched last
+        self._latest: CellMap | None = None  # map that was drawn
         self._drawn: set[int] = set()  # middles of all submaps so far
 
     def step(self, j: int) -> Edge:
@@ -237,7 +238,7 @@ class Closures:
 
     def _map_of(self, members: Iterable[int], origin: int) -> CellMap:
         """What some key frames saw, in the frame of one, as the chain puts them."""
-        cell_map = self._new_map()
+        self._latest = cell_map = self._new_map().begun_like(self._latest)
         for k in members:
             pose = se2.between(self.chained[origin], self.chained[k])
             draw(cell_map, self._keys[k], pose, self._numbers.look_s)

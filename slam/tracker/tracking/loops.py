@@ -132,11 +132,11 @@ class Loops(KeyFrames):
         }
         held |= {(edge.a, edge.b): edge for edge in self._chain if edge.b > edge.a + 1}
         found = spread(self._numbers.loop_m, self._numbers.loop_rad)
-        error = map_errors(self.keys, self._all_poses(), held, self.slack, found)[-1]
+        errors = map_errors(self.keys, self._all_poses(), held, self.slack, found)
         here = self.keys[-1].T_map_robot
         off = self._from_start(self.keys[0].T_map_robot, here) - here
         off[2] = se2.wrap(float(off[2]))
-        return error + np.multiply.outer(off, off)
+        return np.asarray(errors[-1] + np.multiply.outer(off, off))
 
     def _from_start(self, first: Float, T_map_robot: Float) -> Float:
         """(3,) a pose of a map that has the first key frame at ``first``, in the known start's."""

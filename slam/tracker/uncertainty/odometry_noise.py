@@ -10,7 +10,6 @@ in a row that odometry cannot have led to, its next increments may be off by as 
 """
 
 import math
-from dataclasses import replace
 from typing import Self
 
 import numpy as np
@@ -105,8 +104,8 @@ class OdometryNoise:
         self._least = least_stated
         self._slips = False  # in the latest frame
         self._slip: Float = np.zeros((3, 3))  # of the next increment, should a slip go on
-        self._squares: Float = np.zeros(2)
-        self._expected: Float = np.zeros(2)
+        self._squares = [0.0, 0.0]  # no arrays: numbers of those take twice as long
+        self._expected = [0.0, 0.0]
 
     @classmethod
     def of_beams(cls, config: TrackerConfig) -> Self:
@@ -134,17 +133,17 @@ class OdometryNoise:
         stated = now.increment_covariance is not None
         self._least = self._least_stated if stated else self._config.least_assumed
         if self._expected[0] == 0.0:
-            self._expected[:] = self._config.at_first
             first = self._config.stated if stated else self._config.assumed
-            self._squares[:] = self._config.at_first * first
-            self.scales = self._squares / self._expected
-        scales = float(self.scales[0]), float(self.scales[1])
+            self._expected = [self._config.at_first] * 2
+            self._squares = [self._config.at_first * first] * 2
+            self.scales = np.array(self._squares) / self._expected
+        along, turning = self.scales.tolist()
         self._stated = stated
-        prediction = predict(T_map_before, before, now, scales, self.bias)
+        prediction = predict(T_map_before, before, now, (along, turning), self.bias)
         self._slip = math.exp(-max(prediction.elapsed, 0.0) / SLIP_S) * self._slip
-        covariance = prediction.covariance
-        slips = bool((np.diag(self._slip) > np.diag(covariance)).any())
-        return replace(prediction, covariance=covariance + self._slip, slips=slips)
+        (x, _, _), (_, y, _), (_, _, t) = (self._slip - prediction.covariance).tolist()
+        covariance, slips = prediction.covariance + self._slip, max(x, y, t) > 0.0
+        return prediction.changed(covariance=covariance, slips=slips)
 
     def note_slip(self, prediction: Prediction, match: Match) -> None:
         """Ask it of a match, to the map or to a local copy."""
@@ -187,17 +186,18 @@ class OdometryNoise:
         config = self._config
         frames = max(config.memory, config.memory_s / max(prediction.elapsed, 1e-3))
         keep = math.exp(-1.0 / frames)
+        scales: list[float] = self.scales.tolist()
         for k, unit, rest in (
             (0, of_place, floors_m2 + of_carried + found[2]),
             (1, c, floor_rad2 + t + found[3]),
         ):
-            expected = float(self.scales[k]) * unit + rest
+            expected = scales[k] * unit + rest
             square = min(found[k], config.wild * expected)
             # Least squares of square = scale * unit + rest, weighed by what scatter to expect.
             weight = unit / expected**2
             self._squares[k] = keep * self._squares[k] + weight * (square - rest)
             self._expected[k] = keep * self._expected[k] + weight * unit
-            scale = float(self._squares[k]) / max(float(self._expected[k]), 1e-9)
+            scale = self._squares[k] / max(self._expected[k], 1e-9)
             self.scales[k] = min(max(scale, self._least), config.most)
         if self.bias is not None and self._stated:
             # an assumed variance says nothing of what is bias and what is chance
