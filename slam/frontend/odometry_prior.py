@@ -163,7 +163,6 @@ class Prediction:
     unscaled     (3, 3) as stated or assumed, in the previous robot frame; zero: nothing to learn
     floor        m^2 and rad^2 that were added
     loosened     (3, 3) that the matcher's prior of the increment has more than the covariance
-    slips        whether the covariance is mostly that of a slip that may go on
     carried      (3, 3) of the pose before, from odometry that no match has confirmed yet; zero
                  where too little is in view: things that move would lead astray
     """
@@ -176,7 +175,6 @@ class Prediction:
     unscaled: Float = field(default_factory=lambda: np.zeros((3, 3)))
     floor: tuple[float, float] = (0.0, 0.0)
     loosened: Float = field(default_factory=lambda: np.zeros((3, 3)))
-    slips: bool = False
     carried: Float = field(default_factory=lambda: np.zeros((3, 3)))
 
     def changed(self, **fields: Any) -> "Prediction":

@@ -185,20 +185,21 @@ class Tracker(abc.ABC):
 
         Returns what the observed surfaces said about it before, where the robot was tracked to it.
         """
-        if not judged.writes:
-            return None
-        T_map_robot, evidence = judged.match.T_map_robot, None
-        step = min(judged.prediction.elapsed, self.config.map.longest_look_s)
-        if judged.state is State.TRACKING:
+        match, elapsed = judged.match, judged.prediction.elapsed
+        T_map_robot, step = match.T_map_robot, min(elapsed, self.config.map.longest_look_s)
+        tracked, evidence = judged.state is State.TRACKING, None
+        if tracked or judged.followed:
             short_term, turn = self._matcher.reward.short_term, self._loops.n_frames
             times = step, self._pose_covariance.unseen_s
             evidence = look(self.cell_map, short_term, observations, T_map_robot, times, turn)
-        rasterise(self.cell_map, observations, T_map_robot)
-        T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
-        seen = self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
-        if judged.state is State.TRACKING:
-            self._belief.learn(observations, judged, seen)
-        return evidence
+            self._standing.agreement.hold(evidence.old, elapsed)
+        if judged.writes:
+            rasterise(self.cell_map, observations, T_map_robot)
+            T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
+            seen = self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
+            if tracked:
+                self._belief.learn(observations, judged, seen)
+        return evidence if tracked else None
 
     def _update_uncertainty(
         self, observations: Observations, judged: Judged, evidence: Evidence | None
@@ -209,8 +210,8 @@ class Tracker(abc.ABC):
         if match.slipped:  # found by a search, among what does not fit there
             lasting = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
         else:
-            dragged = agreement.dragged(observations.mean_vote)
-            lasting, now = agreement.left_behind(dragged), agreement.covariance(dragged)
+            dragged = agreement.dragged()
+            lasting, now = agreement.left_behind(), agreement.covariance()
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
         self._pose_covariance.dragged(lasting, now)
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
@@ -259,6 +260,7 @@ class Tracker(abc.ABC):
         p_lost = 1.0 - (1.0 - belief.p_lost) * (1.0 - sure.p_off)
         lost = p_lost >= 0.5 and belief.status is not Status.BLIND
         doubtful = 0.0 < alert_m < 3.0 * sure.by_movers_m
+        doubtful |= p_lost > self.config.belief.frozen_above
         self._path.add(frame.stamp_ns, match.T_map_robot, elsewhere)
         covariance = sure.covariance + belief.spread_about(T_map_robot, self._loops.anywhere)
         return Estimate(

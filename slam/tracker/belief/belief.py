@@ -116,7 +116,7 @@ class Belief:
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
         if self._odds.asked and self._is_dragged(cell_map, observations, match):
-            pose = self._agreement.undragged(match.T_map_robot, observations.mean_vote)
+            pose = self._agreement.undragged(match.T_map_robot)
             match, odd = unmatched(pose, matched=match.matched, score=0.0), True
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
@@ -134,7 +134,7 @@ class Belief:
 
     def _is_dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> bool:
         """Whether movers rather carried the match than odometry errs: by it, and what is known."""
-        dragged = self._agreement.dragged(observations.mean_vote)
+        dragged = self._agreement.dragged()
         if dragged <= 0.5:
             return False
         poses = match.T_map_robot, self._agreement.put_back(match.T_map_robot)
@@ -284,13 +284,14 @@ class Belief:
             goes_on = self._usual.share(found, observations) >= self._config.breaks
             episode.note_break(*self._broken(observations, prediction, found))
             self._usual.follow(found, observations, prediction.elapsed)
-            self._agreement.take(prediction, found.T_map_robot, observations.mean_vote)
+            if goes_on:
+                self._agreement.take(prediction, found.T_map_robot, observations.mean_vote)
             hidden = episode.evidence.latest_m < self._config.confirmed_m  # in the scan before
-            dragged = hidden and self._agreement.dragged(observations.mean_vote) > 0.5
+            dragged = goes_on and hidden and self._agreement.dragged() > 0.5
             episode.matched = goes_on and not dragged
             match = found if episode.matched else replace(match, matched=found.matched)
             if dragged:
-                pose = self._agreement.undragged(found.T_map_robot, observations.mean_vote)
+                pose = self._agreement.undragged(found.T_map_robot)
                 match = replace(match, T_map_robot=pose)
         episode.before = episode.evidence.copy()
         episode.evidence.add(cell_map, observations, match.T_map_robot)

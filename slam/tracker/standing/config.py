@@ -53,7 +53,6 @@ class StandingConfig(Settings):
         "likely as not that something is wrong; 0: never asked", SEEDS,
     )  # fmt: skip
     window_s: float = number(2.0, "s", "corrections are summed over it", SEEDS, low=1e-3)
-    long_window_s: float = number(8.0, "s", "and over it", SEEDS, low=1e-3)
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
     alert_m: float = number(

@@ -141,9 +141,7 @@ class OdometryNoise:
         self._stated = stated
         prediction = predict(T_map_before, before, now, (along, turning), self.bias)
         self._slip = math.exp(-max(prediction.elapsed, 0.0) / SLIP_S) * self._slip
-        (x, _, _), (_, y, _), (_, _, t) = (self._slip - prediction.covariance).tolist()
-        covariance, slips = prediction.covariance + self._slip, max(x, y, t) > 0.0
-        return prediction.changed(covariance=covariance, slips=slips)
+        return prediction.changed(covariance=prediction.covariance + self._slip)
 
     def note_slip(self, prediction: Prediction, match: Match) -> None:
         """Ask it of a match, to the map or to a local copy."""

@@ -25,6 +25,7 @@ from slam.tracker.cells import MASK, SHIFT, Cells
 
 # places in the sums of ``_look``
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
+OLD_S = 8.0  # s for which a surface was looked at, at which it counts half as old; fitted
 
 
 class Pairing(NamedTuple):
@@ -98,6 +99,27 @@ def _age(cells: Cells, u: float, v: float) -> float:
 
 
 @inner
+def _old(cells: Cells, u: float, v: float) -> float:
+    """Share in [0, 1] in which the surface next to (u, v) is an old one: its trace y, by its age.
+
+    Of the cells within one of the nearest, the most: a point lies off the surface by its noise.
+    """
+    most = 0.0
+    rows, columns = cells.directory.shape
+    for j in range(math.floor(v - 0.5), math.floor(v - 0.5) + 3):
+        for i in range(math.floor(u - 0.5), math.floor(u - 0.5) + 3):
+            row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
+            if row < 0 or column < 0 or row >= rows or column >= columns:
+                continue
+            slot = cells.directory[row, column]
+            if slot >= 0:
+                age = float(cells.age[slot, j & MASK, i & MASK]) / OLD_S
+                share = age * age / (age * age + 1.0)
+                most = max(most, float(cells.y[slot, j & MASK, i & MASK]) * share)
+    return most
+
+
+@inner
 def _partner(
     points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
     first: int, pairing: Pairing,
@@ -150,7 +172,7 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
     points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
     joined: NDArray[np.bool_], laser: NDArray[np.float64], pose: NDArray[np.float64],
     start: int, step: int, times: tuple[float, float, float], pairing: Pairing,
-    geometry: NDArray[np.float64], sums: NDArray[np.float64],
+    geometry: NDArray[np.float64], sums: NDArray[np.float64], old: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """Add up what ``Evidence`` holds; ``times``: s of one look, of a trace's prior age, and
     since all directions of position were seen."""
@@ -174,7 +196,7 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         sums[NEW] += w * times[0] / age
         new = (times[0] + times[2]) / (age + times[2])
         rx, ry = (u + 0.5) * cell - pose[0], (v + 0.5) * cell - pose[1]
-        a, b, d = 1.0, 0.0, 1.0
+        a, b, d, o = 1.0, 0.0, 1.0, _old(cells, u, v)
         if k >= 0:
             dx, dy = points[k, 0] - points[first, 0], points[k, 1] - points[first, 1]
             length = math.sqrt(dx * dx + dy * dy)
@@ -194,9 +216,17 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         sums[NEW_XX] += new * a
         sums[NEW_XY] += new * b
         sums[NEW_YY] += new * d
-        geometry[0, 2] += b * rx - a * ry
-        geometry[1, 2] += d * rx - b * ry
-        geometry[2, 2] += a * ry * ry - 2.0 * b * rx * ry + d * rx * rx
+        e, f = b * rx - a * ry, d * rx - b * ry
+        h = a * ry * ry - 2.0 * b * rx * ry + d * rx * rx
+        geometry[0, 2] += e
+        geometry[1, 2] += f
+        geometry[2, 2] += h
+        old[0] += o * a
+        old[1] += o * b
+        old[2] += o * e
+        old[3] += o * d
+        old[4] += o * f
+        old[5] += o * h
     geometry[1, 0], geometry[2, 0] = geometry[0, 1], geometry[0, 2]
     geometry[2, 1] = geometry[1, 2]
 
@@ -216,6 +246,8 @@ class Evidence:
     new       weighted sum of the share that this look has in the trace it writes
     new_geometry  (3,) xx, xy, yy: the geometry of positions, each point times the share that looks
               have in its trace since all directions were last seen
+    old       (6,) xx, xy, xt, yy, yt, tt: the geometry, each point times the share in which its
+              surface is an old one; of all points in view
     """
 
     geometry: Float
@@ -226,6 +258,7 @@ class Evidence:
     feigned: float
     new: float
     new_geometry: Float
+    old: Float
 
 
 def look(
@@ -250,7 +283,7 @@ def look(
         bent=config.bent,
         sensor_sigma=seen.sensor_sigma_m,
     )
-    geometry, sums = np.zeros((3, 3)), np.zeros(8)
+    geometry, sums, old = np.zeros((3, 3)), np.zeros(8), np.zeros(6)
     elapsed, since_s = times
     # what moves says nothing of how far the map is off, nor is it new map
     weights = seen.weights if seen.votes is None else seen.weights * seen.votes
@@ -258,7 +291,7 @@ def look(
         cell_map.cells, short_term, cell_map.cell,
         seen.points_robot, seen.covariances, weights, seen.joined, seen.T_robot_laser,
         T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed), since_s), pairing,
-        geometry, sums,
+        geometry, sums, old,
     )  # fmt: skip
     shared, paired, feigned, new, weighed = sums[:NEW_XX].tolist()
     return Evidence(
@@ -270,4 +303,5 @@ def look(
         feigned=feigned,
         new=new,
         new_geometry=sums[NEW_XX:],
+        old=old * step,
     )

@@ -1,0 +1,134 @@
+# SPDX-License-Identifier: Apache-2.0
+"""By how much movers pull a robot off, and by how much the SLAM says: ``Pull``'s numbers.
+
+    python -m scripts.integrity.pulls --jobs 2
+
+Streams of the plane. All corrections of a stream are kept, with the old surface that was in view,
+and by what the pose erred more. Then ``Agreement`` goes through them again with other numbers. Both
+errors and what is said of them are summed over its window, and what each window forgets, squared,
+is added up: the variance by which the map is off in the end. Small is ``left``, the part of errors
+that is not told, over all ways.
+"""
+
+import argparse
+import math
+from collections.abc import Callable, Iterator, Sequence
+from functools import partial
+
+import numpy as np
+
+from scripts import workers
+from scripts.integrity.plane import frames
+from scripts.integrity.ways import Case
+from scripts.marks import table
+from slam import se2
+from slam.frames import Float
+from slam.frontend.odometry_prior import Prediction
+from slam.shunting import ShuntingSlam
+from slam.tracker.standing.agreement import Agreement, Pull
+from slam.tracker.standing.config import StandingConfig
+
+WAYS = ("boards", "chairs", "corridor", "crowd", "herd", "outdated", "poor", "rates")
+FIRST_SEED, SECONDS = 300_000, 150.0
+NEAR_M = 0.3  # farther off a robot is lost, whatever pulls it
+NUMBERS = StandingConfig()
+PULLS = [Pull(), *(Pull(holds=h, few=f) for h in (0.3, 1.0, 3.0) for f in (0.0125, 0.05, 0.2))]
+Event = tuple[Callable[..., None], tuple[object, ...], Float | None]
+"""What ``Agreement`` was told, and for a match by what (3,) the pose erred more, map frame."""
+
+
+class _Recorder(Agreement):
+    """Keeps what it is told."""
+
+    def __init__(self) -> None:
+        self.told: list[tuple[Callable[..., None], tuple[object, ...]]] = []
+        super().__init__(NUMBERS)
+
+    def forget(self) -> None:
+        self.told.append((Agreement.forget, ()))
+        super().forget()
+
+    def hold(self, old: Float, elapsed_s: float) -> None:
+        self.told.append((Agreement.hold, (old.copy(), elapsed_s)))
+        super().hold(old, elapsed_s)
+
+    def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
+        self.told.append((Agreement.take, (prediction, T_map_robot.copy(), vote)))
+        super().take(prediction, T_map_robot, vote)
+
+
+def recorded(case: Case) -> list[Event]:
+    """One stream, through ``shunting``."""
+    stream, slam, agreement = frames(case.spec), ShuntingSlam(), _Recorder()
+    slam._standing.agreement = slam._belief._agreement = agreement
+    events: list[Event] = []
+    before = T_map_before = np.zeros(3)
+    for frame in stream:
+        slam.update(frame.without_truth())
+        assert stream[0].truth is not None
+        assert frame.truth is not None
+        truth, pose = se2.between(stream[0].truth, frame.truth), slam._T_map_robot
+        c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
+        x, y, turn = (se2.between(T_map_before, pose) - se2.between(before, truth)).tolist()
+        erred = np.array([c * x - s * y, s * x + c * y, se2.wrap(turn)])
+        events += [(what, told, erred) for what, told in agreement.told]
+        if math.hypot(*(pose - truth)[:2].tolist()) > NEAR_M:
+            events.append((Agreement.forget, (), None))
+        agreement.told, before, T_map_before = [], truth, pose.copy()
+    return events
+
+
+def variances(events: Sequence[Event], pull: Pull) -> Float:
+    """(3,) m^2 of positions: of errors, of what is said, and of errors without what is said."""
+    agreement, out, error = Agreement(NUMBERS, pull), np.zeros(3), np.zeros(3)
+    latest = np.zeros(3)
+    for what, told, erred in events:
+        what(agreement, *told)
+        if what is Agreement.forget:  # the match of that scan was not used
+            error, latest = np.zeros(3), np.zeros(3)
+        elif what is Agreement.take and erred is not None:
+            out += latest
+            keep = math.exp(-told[0].elapsed / NUMBERS.window_s)  # type: ignore[attr-defined]
+            error = keep * error + erred
+            said = -agreement.put_back(np.zeros(3))
+            both = (error, said, error - said)
+            latest = np.array([float(v[0] ** 2 + v[1] ** 2) for v in both]) * (1.0 - keep * keep)
+    return out + latest
+
+
+def _of_case(way: str, pulls: Sequence[Pull], number: int) -> tuple[str, Float]:
+    case = Case(way=way, number=number, slam="", first_seed=FIRST_SEED, seconds=SECONDS)
+    events = recorded(case)
+    return way, np.array([variances(events, pull) for pull in pulls])
+
+
+def _each(wanted: argparse.Namespace) -> Iterator[tuple[str, Float]]:
+    asked = [(way, k) for k in range(wanted.each) for way in WAYS]
+    jobs = (partial(_of_case, way, PULLS, k) for way, k in asked)
+    return workers.each(_call, list(jobs), jobs=wanted.jobs)
+
+
+def _call(job: Callable[[], tuple[str, Float]]) -> tuple[str, Float]:
+    return job()
+
+
+def main() -> None:
+    """Print a row for each set of numbers: said / true, cm^2 in a minute, way by way."""
+    parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
+    parser.add_argument("--each", type=int, default=8, help="streams of each way")
+    parser.add_argument("--jobs", type=int, default=1)
+    wanted = parser.parse_args()
+    sums = {way: np.zeros((len(PULLS), 3)) for way in WAYS}
+    for way, found in _each(wanted):
+        sums[way] += found
+    each = 1e4 / (wanted.each * SECONDS / 60.0)
+    rows = []
+    for k, pull in enumerate(PULLS):
+        true, _, left = sum(of[k] for of in sums.values())
+        told = [f"{each * of[k, 1]:.1f} / {each * of[k, 0]:.1f}" for of in sums.values()]
+        rows.append([f"{pull.holds:g}", f"{pull.few:g}", *told, f"{left / true:.2f}"])
+    print(table(["holds", "few", *WAYS, "left"], rows, left=2))
+
+
+if __name__ == "__main__":
+    main()
