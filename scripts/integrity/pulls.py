@@ -14,13 +14,14 @@ import argparse
 import math
 from collections.abc import Callable, Iterator, Sequence
 from functools import partial
+from pathlib import Path
 
 import numpy as np
 
 from scripts import workers
 from scripts.integrity.plane import frames
 from scripts.integrity.ways import Case
-from scripts.marks import table
+from scripts.marks import fill_page, table
 from slam import se2
 from slam.frames import Float
 from slam.frontend.odometry_prior import Prediction
@@ -30,10 +31,11 @@ from slam.tracker.standing.config import StandingConfig
 
 WAYS = ("boards", "chairs", "corridor", "crowd", "herd", "outdated", "poor", "rates")
 FIRST_SEED, SECONDS = 300_000, 150.0
+PAGE = Path("docs/trust_in_returns.md")
 NEAR_M = 0.3  # farther off a robot is lost, whatever pulls it
 NUMBERS = StandingConfig()
-PULLS = [Pull(), *(Pull(holds=h, few=f) for h in (0.3, 1.0, 3.0) for f in (0.0125, 0.05, 0.2))]
-Event = tuple[Callable[..., None], tuple[object, ...], Float | None]
+PULLS = [Pull(holds=h, few=f) for h in (0.3, 1.0, 3.0) for f in (0.0125, 0.05, 0.2)]
+Event = tuple[Callable[..., object], tuple[object, ...], Float | None]
 """What ``Agreement`` was told, and for a match by what (3,) the pose erred more, map frame."""
 
 
@@ -41,7 +43,7 @@ class _Recorder(Agreement):
     """Keeps what it is told."""
 
     def __init__(self) -> None:
-        self.told: list[tuple[Callable[..., None], tuple[object, ...]]] = []
+        self.told: list[tuple[Callable[..., object], tuple[object, ...]]] = []
         super().__init__(NUMBERS)
 
     def forget(self) -> None:
@@ -56,6 +58,12 @@ class _Recorder(Agreement):
         self.told.append((Agreement.take, (prediction, T_map_robot.copy(), vote)))
         super().take(prediction, T_map_robot, vote)
 
+    def undragged(self, T_map_robot: Float) -> Float:
+        kept = list(self.told)
+        pose = super().undragged(T_map_robot)
+        self.told = [*kept, (Agreement.undragged, (T_map_robot.copy(),))]
+        return pose
+
 
 def recorded(case: Case) -> list[Event]:
     """One stream, through ``shunting``."""
@@ -68,7 +76,7 @@ def recorded(case: Case) -> list[Event]:
         assert stream[0].truth is not None
         assert frame.truth is not None
         truth, pose = se2.between(stream[0].truth, frame.truth), slam._T_map_robot
-        c, s = math.cos(float(pose[2])), math.sin(float(pose[2]))
+        c, s = math.cos(float(T_map_before[2])), math.sin(float(T_map_before[2]))
         x, y, turn = (se2.between(T_map_before, pose) - se2.between(before, truth)).tolist()
         erred = np.array([c * x - s * y, s * x + c * y, se2.wrap(turn)])
         events += [(what, told, erred) for what, told in agreement.told]
@@ -84,7 +92,7 @@ def variances(events: Sequence[Event], pull: Pull) -> Float:
     latest = np.zeros(3)
     for what, told, erred in events:
         what(agreement, *told)
-        if what is Agreement.forget:  # the match of that scan was not used
+        if what in (Agreement.forget, Agreement.undragged):  # that scan's match was not used
             error, latest = np.zeros(3), np.zeros(3)
         elif what is Agreement.take and erred is not None:
             out += latest
@@ -113,21 +121,24 @@ def _call(job: Callable[[], tuple[str, Float]]) -> tuple[str, Float]:
 
 
 def main() -> None:
-    """Print a row for each set of numbers: said / true, cm^2 in a minute, way by way."""
+    """Print a row for each set of numbers, and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--each", type=int, default=8, help="streams of each way")
     parser.add_argument("--jobs", type=int, default=1)
+    parser.add_argument("--page", type=Path, default=PAGE)
     wanted = parser.parse_args()
     sums = {way: np.zeros((len(PULLS), 3)) for way in WAYS}
     for way, found in _each(wanted):
         sums[way] += found
     each = 1e4 / (wanted.each * SECONDS / 60.0)
-    rows = []
+    rows = []  # said / true, cm^2 in a minute, way by way
     for k, pull in enumerate(PULLS):
         true, _, left = sum(of[k] for of in sums.values())
         told = [f"{each * of[k, 1]:.1f} / {each * of[k, 0]:.1f}" for of in sums.values()]
         rows.append([f"{pull.holds:g}", f"{pull.few:g}", *told, f"{left / true:.2f}"])
-    print(table(["holds", "few", *WAYS, "left"], rows, left=2))
+    text = table(["holds", "few", *WAYS, "left"], rows, left=2)
+    print(text)
+    fill_page(wanted.page, "pulls", text)
 
 
 if __name__ == "__main__":

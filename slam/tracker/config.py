@@ -56,6 +56,7 @@ class TrackerConfig(Settings):
         "tracking.freeze_below": "carried_per_h",
         "tracking.quality.give_up_s": "tracking.give_up_s",
         "standing.doubtful_m": "standing.alert_m",
+        "standing.long_window_s": "standing.window_s",
         "belief.searches": "belief.searched",
     }
     constants: ClassVar[Mapping[str, str]] = {

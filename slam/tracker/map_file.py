@@ -43,8 +43,9 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
     "frontend": ("spacing_m", "least_weight"),
     "belief": ("confirmed_share",),
     "standing": (
-        "better", "doubtful_m", "explains", "fallen", "fallen_s", "outvoted", "rival_gain",
-        "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans", "undecided_s",
+        "better", "doubtful_m", "explains", "fallen", "fallen_s", "long_window_s", "outvoted",
+        "rival_gain", "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans",
+        "undecided_s",
     ),
     "tracking.relocalise": (
         "alias", "alone", "denied_here", "drift_m", "drift_rad", "enough", "enough_last",

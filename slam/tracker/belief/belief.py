@@ -8,8 +8,6 @@ the long-known map and what they see through (``evidence``), and a prior that is
 posterior. docs/belief.md has the mathematics.
 """
 
-from __future__ import annotations
-
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 

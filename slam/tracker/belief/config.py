@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers of the belief: what evidence weighs, and how often a robot is carried or slips."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from slam.settings import Settings, number

@@ -7,8 +7,6 @@ is in the map, and its scans still agree with one another. If the robot turns ou
 motion led, the copy becomes the map.
 """
 
-from __future__ import annotations
-
 import math
 from dataclasses import dataclass
 

@@ -5,8 +5,6 @@ A return that stops short of a known surface says nothing: something came betwee
 map counts once for a place, by its most: standing still, or forty looks at one board, add nothing.
 """
 
-from __future__ import annotations
-
 import numpy as np
 
 from slam import se2
@@ -31,7 +29,7 @@ class Evidence:
         self._counted = ANEW
         self.known_m = self.through_m = self.latest_m = 0.0
 
-    def copy(self) -> Evidence:
+    def copy(self) -> "Evidence":
         """The same, to be gone on with elsewhere."""
         other = Evidence()
         other._counted = self._counted.copy()

@@ -6,8 +6,6 @@ and matched to the scans. A scan does no more of this than its budget allows: th
 over the scans that follow, and where there are many places, they are matched by turns.
 """
 
-from __future__ import annotations
-
 import math
 from collections.abc import Callable
 from dataclasses import dataclass, field, replace

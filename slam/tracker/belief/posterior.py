@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Log-weights of the places where the robot may be, and their probabilities: docs/belief.md."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Sequence
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is said of a robot's pose, scan by scan."""
 
-from __future__ import annotations
-
 from enum import StrEnum
 
 

@@ -14,14 +14,14 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
-from slam.frontend.odometry_prior import Prediction, upper_inverted
+from slam.frontend.odometry_prior import Prediction, turned, upper_inverted
 from slam.tracker.standing.config import StandingConfig
 
 
 class Pull(NamedTuple):
-    """Which share of a correction movers may have made; fitted: ``scripts.integrity.pulls``.
+    """Which share of a correction movers may have made: ``scripts.integrity.pulls``.
 
-    held_s   s over which the old surface in view is averaged
+    held_s   s over which the old surface that scans saw is averaged
     holds    weight (0.1 m each) of old surface that halves the share
     few      share of the returns without weight with which the whole share is left to movers
     lever_m  m: a heading is held by ``holds`` so far away
@@ -36,11 +36,11 @@ class Pull(NamedTuple):
 class Agreement:
     """Sums of what movers may have made of the corrections, against what odometry may be off.
 
-    A match corrects the prediction by c. G is the information of the old surface in view, u the
-    share of the returns without weight: ``P = min(u / few, 1) H (H + G)^-1`` is the share that is
-    left to movers, with H = holds diag(1, 1, lever^2). A window of w s forgets with exp(-t / w): S
-    is the sum of P c, V that of odometry's covariances. With R, what a match itself may be off,
-    S' (V + R)^-1 S / 3 is at most about 1 where all is well.
+    A match corrects the prediction by c. G is the information of the old surface that the scans
+    before it saw, u the share of its returns without weight. With H = holds diag(1, 1, lever^2),
+    ``P = min(u / few, 1) H (H + G)^-1`` is the share that is left to movers. A window of w s
+    forgets with exp(-t / w): S is the sum of P c, V that of odometry's covariances. With R, what a
+    match itself may be off, S' (V + R)^-1 S / 3 is at most about 1 where all is well.
 
     ratio  that
     """
@@ -58,6 +58,12 @@ class Agreement:
         self.ratio = 0.0
         self._elapsed_s = 0.0
         self._put_back: Float = np.zeros((3, 3))
+
+    def turned(self, by: float) -> None:
+        """The map frame was turned by ``by`` rad, and the robot with it."""
+        c, s, (x, y, t) = math.cos(by), math.sin(by), self._sum
+        self._sum = [c * x - s * y, s * x + c * y, t]
+        self._variance, self._held = _turned(self._variance, by), _turned(self._held, by)
 
     def hold(self, old: Float, elapsed_s: float) -> None:
         """A scan shows so much old surface: (6,) xx, xy, xt, yy, yt, tt about the robot."""
@@ -141,3 +147,11 @@ class Agreement:
         left = (1.0 - keep * keep) * self.covariance() + self._put_back
         self._elapsed_s, self._put_back = 0.0, np.zeros((3, 3))
         return left
+
+
+def _turned(upper: list[float], by: float) -> list[float]:
+    """A symmetric matrix, by xx, xy, xt, yy, yt, tt, in axes turned by -``by``."""
+    xx, xy, xt, yy, yt, tt = upper
+    matrix = turned(np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]]), by)
+    (xx, xy, xt), (_, yy, yt), (_, _, tt) = matrix.tolist()
+    return [xx, xy, xt, yy, yt, tt]

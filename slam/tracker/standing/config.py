@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The numbers of trust in returns: the weight of a return, and when odometry contradicts."""
 
-from __future__ import annotations
-
 from dataclasses import dataclass
 
 from slam.settings import Settings, number
@@ -49,8 +47,8 @@ class StandingConfig(Settings):
         0.1, "m", "narrower things keep their weight: earlier beams may have missed them", SEEDS
     )
     disagreed: float = number(
-        3.0, "ratio", "of corrections over what odometry may be off, squared, at which it is as "
-        "likely as not that something is wrong; 0: never asked", SEEDS,
+        3.0, "ratio", "of what movers may have made of corrections over what odometry may be off, "
+        "squared, at which they are as likely as not; 0: never asked", SEEDS,
     )  # fmt: skip
     window_s: float = number(2.0, "s", "corrections are summed over it", SEEDS, low=1e-3)
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What earlier scans say about the places of present returns, and the other way round."""
 
-from __future__ import annotations
-
 import math
 from typing import NamedTuple
 

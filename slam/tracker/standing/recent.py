@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scans of the last seconds, kept to say which present returns come from what stands."""
 
-from __future__ import annotations
-
 import math
 from collections import deque
 from dataclasses import dataclass, replace
@@ -69,7 +67,7 @@ class Standing:
 
     def moved(self, T_new_old: Float) -> None:
         """The map moved: so did what was seen in it."""
-        self.agreement.forget()
+        self.agreement.turned(float(T_new_old[2]))
         self._looks = deque(
             replace(
                 look,

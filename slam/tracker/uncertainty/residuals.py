@@ -25,7 +25,7 @@ from slam.tracker.cells import MASK, SHIFT, Cells
 
 # places in the sums of ``_look``
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
-OLD_S = 8.0  # s for which a surface was looked at, at which it counts half as old; fitted
+OLD_S = 8.0  # s for which a surface was looked at, at which it counts half as old; set by hand
 
 
 class Pairing(NamedTuple):

@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("0ef57c0d35a2", "89d0d5d98c10")),
-        (OccupancyConfig, ["grid"], ("6bc11616c1cb", "43a58aeb0919")),
+        (ShuntingConfig, [], ("92eccca714b7", "a5815c0fd9d0")),
+        (OccupancyConfig, ["grid"], ("ae332a671335", "1120af3a5dea")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
@@ -37,6 +37,7 @@ def test_a_tree_keeps_its_paths_its_order_and_its_digest(
         ("tracking.freeze_below", "carried_per_h"),
         ("tracking.quality.give_up_s", "tracking.give_up_s"),
         ("standing.doubtful_m", "standing.alert_m"),
+        ("standing.long_window_s", "standing.window_s"),
     ],
 )
 def test_a_number_that_is_gone_is_refused_by_the_name_of_what_took_its_place(

@@ -229,7 +229,9 @@ def test_a_map_of_before_one_belief_is_read(
     for name in ("belief", "carried_per_h"):
         del config[name]
     config["freeze_below"] = freeze_below
-    config["standing"] |= {"fallen": 0.8, "rival_scans": 3, "undecided_s": 2.0}
+    config["standing"] |= {
+        "fallen": 0.8, "rival_scans": 3, "undecided_s": 2.0, "long_window_s": 8.0,
+    }  # fmt: skip
     config["tracking"] |= {
         "quality": {"lost_after": 3, "give_up_s": 60.0}, "verdict": {"even": 0.45, "steep": 20.0},
     }  # fmt: skip

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Short drives in flat rooms after which something happens to the robot or to the room."""
 
-from __future__ import annotations
-
 import math
 from collections.abc import Iterable
 from typing import Any

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Rooms that a map has known for long, and scans of them, without noise."""
 
-from __future__ import annotations
-
 from typing import Any
 
 import numpy as np

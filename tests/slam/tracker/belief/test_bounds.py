@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """No number of the belief breaks anything where it is as small or as large as it may be."""
 
-from __future__ import annotations
-
 import numpy as np
 import pytest
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What scans say of a place: in metres of long-known surface, and of each cell once."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The covariance of a pose that may be at several places, and where they are followed."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A room that changes, boards that hide it, a few things that move: nobody is lost by that."""
 
-from __future__ import annotations
-
 import math
 
 import numpy as np

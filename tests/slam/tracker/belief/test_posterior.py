@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The equations of the belief: what evidence weighs, what priors cost, and that it adds up."""
 
-from __future__ import annotations
-
 import math
 from dataclasses import replace
 

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a SLAM with one belief promises: found where carried, and nowhere else than it is."""
 
-from __future__ import annotations
-
 import math
 from collections import Counter
 from dataclasses import replace
@@ -285,9 +283,9 @@ def test_a_false_alarm_that_movers_carried_the_matches_off_changes_nothing(
     pose = at(system)
     stream = going_on(still(ROOMS, pose, 2.0), last)
     with monkeypatch.context() as patched:
-        patched.setattr(system._standing.agreement, "dragged", lambda vote: 0.9)
+        patched.setattr(system._standing.agreement, "dragged", lambda: 0.9)
         patched.setattr(
-            system._standing.agreement, "undragged", lambda T, _: T + np.array([0.15, 0.0, 0.0])
+            system._standing.agreement, "undragged", lambda T: T + np.array([0.15, 0.0, 0.0])
         )
         said = told(system, stream[:1])
     said += told(system, stream[1:])
@@ -304,7 +302,7 @@ def test_a_match_is_put_back_to_odometry_only_where_what_is_long_known_allows_it
     pose = at(system)
     box = rectangle(pose[0] - 0.9, pose[1] - 0.9, pose[0] + 0.9, pose[1] + 0.9)
     room = World2D(np.concatenate([box, arena()])) if hidden else ROOMS
-    monkeypatch.setattr(system._standing.agreement, "dragged", lambda vote: 0.9)
+    monkeypatch.setattr(system._standing.agreement, "dragged", lambda: 0.9)
     monkeypatch.setattr(
         system._standing.agreement, "put_back", lambda T: T + np.array([0.3, 0.0, 0.0])
     )

@@ -8,13 +8,14 @@ import pytest
 from numpy.typing import NDArray
 
 from slam.frontend.odometry_prior import Prediction
-from slam.tracker.standing.agreement import HOLDS, LEVER_M, Agreement
+from slam.tracker.standing.agreement import Agreement, Pull
 from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 
 Array = NDArray[np.float64]
 NUMBERS = StandingConfig()
 SIGMA = np.array([0.003, 0.003, 0.003])  # of one step of odometry: m, m, rad
 STEP_S = 0.2
+PULL = Pull()
 NOTHING, A_ROOM = np.zeros(6), np.array([40.0, 0.0, 0.0, 40.0, 0.0, 200.0])  # old surface in view
 
 
@@ -25,12 +26,15 @@ def by_odometry(sigma: Array = SIGMA) -> Prediction:
     )  # fmt: skip
 
 
-def fed(corrections: Array, old: Array = NOTHING, config: StandingConfig = NUMBERS) -> Agreement:
-    """After so many matches with that old surface in view, each off its prediction by a row."""
+def fed(
+    corrections: Array, old: Array = NOTHING, *, vote: float = 0.0, config: StandingConfig = NUMBERS
+) -> Agreement:
+    """After so many matches by returns of that vote, with that old surface in view, each off its
+    prediction by a row."""
     agreement = Agreement(config)
     for off in corrections:
         agreement.hold(old, STEP_S)
-        agreement.take(by_odometry(), off)
+        agreement.take(by_odometry(), off, vote)
     return agreement
 
 
@@ -47,7 +51,7 @@ def test_chance_corrections_agree() -> None:
 
 
 def test_small_corrections_to_one_side_add_up() -> None:
-    """Half a sigma each: nothing in one scan, 1.5 cm in 2 s."""
+    """0.6 sigma each: nothing in one scan, 2 cm in 2 s."""
     n, keep = 200, math.exp(-STEP_S / NUMBERS.window_s)
     agreement = fed(np.tile([0.6 * SIGMA[0], 0.0, 0.0], (n, 1)))
     S = 0.6 * SIGMA[0] * (1.0 - keep**n) / (1.0 - keep)
@@ -61,8 +65,18 @@ def test_what_old_surface_shows_is_odometrys_error() -> None:
     rows = np.tile(20.0 * SIGMA, (10, 1))
     assert fed(rows, A_ROOM).ratio < NUMBERS.disagreed < 100.0 < fed(rows).ratio
     left = summed(fed(rows, A_ROOM)) / summed(fed(rows))
-    expected = [HOLDS / (HOLDS + 40.0)] * 2 + [HOLDS * LEVER_M**2 / (HOLDS * LEVER_M**2 + 200.0)]
+    turn = PULL.holds * PULL.lever_m**2
+    expected = [PULL.holds / (PULL.holds + 40.0)] * 2 + [turn / (turn + 200.0)]
     assert left == pytest.approx(expected, rel=1e-9)
+
+
+def test_where_all_returns_have_weight_nobody_moves() -> None:
+    """A building that is seen the first time has no old surface, and no correction is a mover's."""
+    rows = np.tile(20.0 * SIGMA, (10, 1))
+    assert not summed(fed(rows, vote=1.0)).any()
+    some = summed(fed(rows, vote=1.0 - 0.4 * PULL.few)) / summed(fed(rows))
+    assert some == pytest.approx(0.4)
+    assert summed(fed(rows, vote=1.0 - PULL.few)) == pytest.approx(summed(fed(rows)))
 
 
 def test_a_corridor_holds_the_robot_across_and_not_along() -> None:
@@ -75,7 +89,7 @@ def test_a_corridor_holds_the_robot_across_and_not_along() -> None:
         across = np.tile([-0.01 * s, 0.01 * c, 0.0], (10, 1))
         whole = summed(fed(rows))[0]
         assert summed(fed(along, walls)) == pytest.approx([c * whole, s * whole, 0.0], abs=1e-12)
-        held = HOLDS / (HOLDS + 40.0) * whole
+        held = PULL.holds / (PULL.holds + 40.0) * whole
         assert summed(fed(across, walls)) == pytest.approx([-s * held, c * held, 0.0], abs=1e-12)
 
 
@@ -86,7 +100,7 @@ def test_surface_that_was_in_view_holds_for_half_a_second() -> None:
     for _ in range(10):
         agreement.hold(NOTHING, STEP_S)
         before = summed(agreement)[0] * math.exp(-STEP_S / NUMBERS.window_s)
-        agreement.take(by_odometry(), np.array([0.001, 0.0, 0.0]))
+        agreement.take(by_odometry(), np.array([0.001, 0.0, 0.0]), 0.0)
         shares.append((summed(agreement)[0] - before) / 0.001)
     assert shares[0] < 0.05
     assert np.all(np.diff(shares) > 0.0)
@@ -120,7 +134,7 @@ def test_what_the_window_forgets_stays_in_the_map() -> None:
     whole, left_behind = agreement.covariance(), np.zeros((3, 3))
     for _ in range(400):
         left_behind += agreement.left_behind()
-        agreement.take(by_odometry(1e-6 * SIGMA), np.zeros(3))
+        agreement.take(by_odometry(1e-6 * SIGMA), np.zeros(3), 0.0)
     assert left_behind == pytest.approx(whole, rel=1e-6, abs=1e-15)
 
 
@@ -141,3 +155,17 @@ def test_a_robot_that_was_set_elsewhere_starts_anew() -> None:
     agreement.forget()
     assert agreement.ratio == 0.0
     assert not agreement.covariance().any()
+
+
+def test_in_a_map_that_was_turned_the_old_surface_holds_as_before() -> None:
+    """After a loop's correction: else all of the next one would be left to movers."""
+    turn, rows = 0.8, np.tile([0.01, 0.0, 0.0], (10, 1))
+    c, s = math.cos(turn), math.sin(turn)
+    walls = np.array([40.0, 0.0, 0.0, 2.0, 3.0, 30.0])
+    turned, asked = fed(rows, walls), fed(rows, walls)
+    turned.turned(turn)
+    asked.take(by_odometry(), np.array([0.02, 0.05, 0.0]), 0.0)
+    turned.take(by_odometry(), np.array([c * 0.02 - s * 0.05, s * 0.02 + c * 0.05, 0.0]), 0.0)
+    x, y, t = summed(asked)
+    assert summed(turned) == pytest.approx([c * x - s * y, s * x + c * y, t])
+    assert turned.ratio == pytest.approx(asked.ratio)

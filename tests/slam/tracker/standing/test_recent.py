@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Which returns vote: what stands, what was never seen, and what is too thin to be missed."""
 
-from __future__ import annotations
-
 from dataclasses import replace
 
 import numpy as np

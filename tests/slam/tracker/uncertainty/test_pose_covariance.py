@@ -46,7 +46,7 @@ def matched(information: Float, T: Float = ZERO) -> Match:
 def seen(geometry: Float, weighed: float = 20.0, **more: Any) -> Evidence:
     """Surfaces of that geometry a beam, seen long and with errors of their own."""
     rest: dict[str, Any] = {"in_view": 75.0, "shared": 0.0, "feigned": 0.0, "new": 0.0} | more
-    rest = {"paired": weighed, "new_geometry": ZERO} | rest
+    rest = {"paired": weighed, "new_geometry": ZERO, "old": np.zeros(6)} | rest
     return Evidence(geometry=weighed * geometry, weighed=weighed, **rest)
 
 
@@ -135,6 +135,29 @@ def test_matches_scatter_as_their_information_says() -> None:
     ratios = np.linalg.eigvals(np.linalg.solve(expected, sampled)).real
     assert ratios.min() > 0.2
     assert ratios.max() < 3.0
+
+
+def test_surface_is_old_by_how_long_it_was_looked_at() -> None:
+    """a^2 / (a^2 + (8 s)^2) of the geometry: next to nothing after 1 s, half after 8, all in the
+    end; and where the robot sees what the map does not have, nothing."""
+    drive = Drive((0.0, 0.0, 0.0), ((0.0, 0.0, 70.0),))
+    world, network, shares = World2D(arena()), Network(CONFIG), []
+    stream = frames(world, drive, rate_hz=5.0, spec=laser(181), seed=3)
+    for k, frame in enumerate(stream):
+        assert frame.scan is not None
+        view = from_scan(frame.scan, np.zeros(3), CONFIG)
+        if k in (5, 40, 320):
+            evidence = look(network, 0.3, view, np.zeros(3), (0.2, 0.0), 0)
+            whole = evidence.geometry * (evidence.in_view / evidence.weighed)
+            shares.append(evidence.old[[0, 3, 5]] / np.diag(whole))
+        rasterise(network, view, np.zeros(3))
+        network.integrate(view.view, view.T_robot_laser, 0.2, write=True)
+    new, half, old = (float(np.mean(share)) for share in shares)
+    assert new < 0.03
+    assert 0.3 < half < 0.55
+    assert old > 0.8
+    elsewhere = look(network, 0.3, view, np.array([0.8, 0.5, 0.4]), (0.2, 0.0), 0)
+    assert elsewhere.old[0] < 0.2 * evidence.old[0]
 
 
 def test_residuals_of_noise_are_not_shared_and_a_moved_wall_is() -> None:
