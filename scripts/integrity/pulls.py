@@ -6,8 +6,8 @@
 Streams of the plane. All corrections of a stream are kept, with the old surface that was in view,
 and by what the pose erred more. Then ``Agreement`` goes through them again with other numbers. Both
 errors and what is said of them are summed over its window, and what each window forgets, squared,
-is added up: the variance by which the map is off in the end. Small is ``left``, the part of errors
-that is not told, over all ways.
+is added up: the variance by which the map is off in the end. The last row is the same of errors
+less what is said of them, over all ways.
 """
 
 import argparse
@@ -34,7 +34,13 @@ FIRST_SEED, SECONDS = 300_000, 150.0
 PAGE = Path("docs/trust_in_returns.md")
 NEAR_M = 0.3  # farther off a robot is lost, whatever pulls it
 NUMBERS = StandingConfig()
-PULLS = [Pull(holds=h, few=f) for h in (0.3, 1.0, 3.0) for f in (0.0125, 0.05, 0.2)]
+PULLS = {
+    "as it is": Pull(),
+    "holds 0.3": Pull(holds=0.3),
+    "holds 3": Pull(holds=3.0),
+    "few 0.2": Pull(few=0.2),
+    "few 0.01": Pull(few=0.01),
+}
 Event = tuple[Callable[..., object], tuple[object, ...], Float | None]
 """What ``Agreement`` was told, and for a match by what (3,) the pose erred more, map frame."""
 
@@ -112,7 +118,7 @@ def _of_case(way: str, pulls: Sequence[Pull], number: int) -> tuple[str, Float]:
 
 def _each(wanted: argparse.Namespace) -> Iterator[tuple[str, Float]]:
     asked = [(way, k) for k in range(wanted.each) for way in WAYS]
-    jobs = (partial(_of_case, way, PULLS, k) for way, k in asked)
+    jobs = (partial(_of_case, way, list(PULLS.values()), k) for way, k in asked)
     return workers.each(_call, list(jobs), jobs=wanted.jobs)
 
 
@@ -121,7 +127,7 @@ def _call(job: Callable[[], tuple[str, Float]]) -> tuple[str, Float]:
 
 
 def main() -> None:
-    """Print a row for each set of numbers, and fill the page."""
+    """Print a row for each way, and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
     parser.add_argument("--each", type=int, default=8, help="streams of each way")
     parser.add_argument("--jobs", type=int, default=1)
@@ -131,14 +137,14 @@ def main() -> None:
     for way, found in _each(wanted):
         sums[way] += found
     each = 1e4 / (wanted.each * SECONDS / 60.0)
-    rows = []  # said / true, cm^2 in a minute, way by way
-    for k, pull in enumerate(PULLS):
-        true, _, left = sum(of[k] for of in sums.values())
-        told = [f"{each * of[k, 1]:.1f} / {each * of[k, 0]:.1f}" for of in sums.values()]
-        rows.append([f"{pull.holds:g}", f"{pull.few:g}", *told, f"{left / true:.2f}"])
-    text = table(["holds", "few", *WAYS, "left"], rows, left=2)
+    rows = []
+    for way, of in sums.items():
+        rows.append([way, f"{each * of[0, 0]:.0f}", *(f"{each * said:.0f}" for said in of[:, 1])])
+    true, _, left = np.sum(list(sums.values()), axis=0).T
+    rows.append(["not said, of all", "1", *(f"{share:.2f}" for share in left / true)])
+    text = table(["cm² in a minute", "true", *PULLS], rows)
     print(text)
-    fill_page(wanted.page, "pulls", text)
+    fill_page(wanted.page, "pulls", text, most=100)
 
 
 if __name__ == "__main__":

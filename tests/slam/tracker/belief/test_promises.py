@@ -309,3 +309,21 @@ def test_a_match_is_put_back_to_odometry_only_where_what_is_long_known_allows_it
     said = told(system, going_on(still(room, pose, 0.2), last)[:1])[0]
     moved_m = float(np.hypot(*(system._T_map_robot - pose)[:2]))
     assert (moved_m < 0.02) == stays, said.diagnostics
+
+
+@pytest.mark.parametrize("kind", SLAMS)
+def test_old_surface_holds_the_robot_and_holds_no_more_once_a_box_hides_it(
+    kind: type[Tracker],
+) -> None:
+    """Also in scans that are not written: what they see of the map is not what hides it."""
+    system, last = mapped(ROOMS, kind=kind)
+    pose = at(system)
+    held = system._standing.agreement
+    seen = going_on(still(ROOMS, pose, 1.0), last)
+    told(system, seen)
+    walls = min(held._held[0], held._held[3]) / held._looks
+    assert walls > 5.0  # half a metre at least, in both directions
+    box = rectangle(pose[0] - 0.9, pose[1] - 0.9, pose[0] + 0.9, pose[1] + 0.9)
+    hidden = World2D(np.concatenate([box, arena()]))
+    told(system, going_on(still(hidden, pose, 2.5), seen[-1]))
+    assert max(held._held[0], held._held[3]) / held._looks < 0.5 * walls
