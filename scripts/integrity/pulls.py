@@ -60,9 +60,12 @@ class _Recorder(Agreement):
         self.told.append((Agreement.hold, (old.copy(), elapsed_s)))
         super().hold(old, elapsed_s)
 
-    def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
-        self.told.append((Agreement.take, (prediction, T_map_robot.copy(), vote)))
-        super().take(prediction, T_map_robot, vote)
+    def take(
+        self, prediction: Prediction, T_map_robot: Float, vote: float, *, in_doubt: bool = False
+    ) -> None:
+        if not in_doubt:
+            self.told.append((Agreement.take, (prediction, T_map_robot.copy(), vote)))
+        super().take(prediction, T_map_robot, vote, in_doubt=in_doubt)
 
     def undragged(self, T_map_robot: Float) -> Float:
         kept = list(self.told)

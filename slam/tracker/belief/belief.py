@@ -283,7 +283,8 @@ class Belief:
             episode.note_break(*self._broken(observations, prediction, found))
             self._usual.follow(found, observations, prediction.elapsed)
             if goes_on:
-                self._agreement.take(prediction, found.T_map_robot, observations.mean_vote)
+                vote = observations.mean_vote
+                self._agreement.take(prediction, found.T_map_robot, vote, in_doubt=True)
             hidden = episode.evidence.latest_m < self._config.confirmed_m  # in the scan before
             dragged = goes_on and hidden and self._agreement.dragged() > 0.5
             episode.matched = goes_on and not dragged

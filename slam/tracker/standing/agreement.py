@@ -33,6 +33,11 @@ class Pull(NamedTuple):
     lever_m: float = 0.5
 
 
+# Old surface, xx to tt, where the pose is in doubt, and what the map shows there with it: none. But
+# movers turn no robot.
+IN_DOUBT = (0.0, 0.0, 0.0, 0.0, 0.0, 100.0)
+
+
 class Agreement:
     """Sums of what movers may have made of the corrections, against what odometry may be off.
 
@@ -71,10 +76,13 @@ class Agreement:
         self._held = [keep * a + b for a, b in zip(self._held, old.tolist(), strict=True)]
         self._looks = keep * self._looks + 1.0
 
-    def _left_to_movers(self, vote: float, off: Float) -> tuple[float, float, float]:
+    def _left_to_movers(
+        self, vote: float, off: Float, in_doubt: bool
+    ) -> tuple[float, float, float]:
         """P c of a correction (3,) by returns of that mean vote."""
         (x, y, t), without, pull = off.tolist(), max(1.0 - vote, 0.0), self._pull
-        xx, xy, xt, yy, yt, tt = (v / max(self._looks, 1.0) for v in self._held)
+        held = IN_DOUBT if in_doubt else [v / max(self._looks, 1.0) for v in self._held]
+        xx, xy, xt, yy, yt, tt = held
         h, turn = pull.holds, pull.holds * pull.lever_m * pull.lever_m
         a, b, c, d, e, f = upper_inverted(xx + h, xy, xt, yy + h, yt, tt + turn)
         h, turn = (min(without / pull.few, 1.0) * v for v in (h, turn))
@@ -84,9 +92,12 @@ class Agreement:
             turn * (c * x + e * y + f * t),
         )
 
-    def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
-        """The robot is matched to ``T_map_robot`` by returns of that mean vote."""
-        pulled = self._left_to_movers(vote, prediction.off(T_map_robot))
+    def take(
+        self, prediction: Prediction, T_map_robot: Float, vote: float, *, in_doubt: bool = False
+    ) -> None:
+        """The robot is matched to ``T_map_robot`` by returns of that mean vote; ``in_doubt``: not
+        to the map, which nobody knows to be there."""
+        pulled = self._left_to_movers(vote, prediction.off(T_map_robot), in_doubt)
         (xx, xy, xt), (_, yy, yt), (_, _, tt) = prediction.covariance.tolist()
         self._elapsed_s = prediction.elapsed
         keep = math.exp(-prediction.elapsed / self._config.window_s)
