@@ -107,6 +107,14 @@ def test_surface_that_was_in_view_holds_for_half_a_second() -> None:
     assert shares[-1] > 0.5
 
 
+def test_while_the_pose_is_in_doubt_the_map_holds_no_position_but_a_heading() -> None:
+    agreement = fed(np.zeros((20, 3)), A_ROOM)
+    agreement.take(by_odometry(), np.array([0.02, -0.01, 0.03]), 0.0, in_doubt=True)
+    x, y, turn = summed(agreement)
+    assert (x, y) == pytest.approx((0.02, -0.01))
+    assert turn < 0.01 * 0.03
+
+
 def test_half_of_the_matches_are_blamed_at_the_ratio_that_says_nothing() -> None:
     agreement = fed(np.zeros((1, 3)))
     agreement.ratio = NUMBERS.disagreed
