@@ -164,10 +164,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     publish(wanted.docs, wanted.results, wanted.days, wanted.commit)
 
 
-if __name__ == "__main__":
-    sys.exit(main())
-
-
 def _look(slam: str, k: int) -> dict[str, Any]:
     if slam.startswith(ORACLE):
         return {"color": "#202020", "ls": "--", "marker": "", "lw": 1.6}
@@ -217,3 +213,7 @@ def spread(ends: Sequence[float]) -> list[float]:
         places[k] = min(places[k], top)
         top = float(places[k]) - APART
     return [float(place) for place in places]
+
+
+if __name__ == "__main__":
+    sys.exit(main())
