@@ -26,7 +26,7 @@ from slam.tracker.cells import living
 
 ROW_NS = 600 * NS_PER_S  # of the run, a row of the table
 HEADINGS = ("min", "scans", "world, ms", "SLAM, ms", "slowest, ms", "RSS, MB", "blocks",
-            "error, cm", "lost")  # fmt: skip
+            "error, cm", "lost", "not trusted")  # fmt: skip
 
 
 def there_and_back(path: Path) -> Iterator[Frame]:
@@ -59,15 +59,16 @@ def measure(frames: Iterator[Frame], hours: float) -> None:
         if first.truth is not None and frame.truth is not None:
             off = estimate.T_map_robot - se2.between(first.truth, frame.truth)
             off_m = float(np.hypot(off[0], off[1]))
-        row.append((world_s, slam_s, off_m))
+        row.append((world_s, slam_s, off_m, not estimate.converged))
         if frame.stamp_ns >= due_ns:
-            world, spent, errors = np.array(row).T
+            world, spent, errors, doubted = np.array(row).T
             told = (
                 f"{(due_ns - first.stamp_ns) / NS_PER_S / 60:.0f}", f"{len(row)}",
                 f"{world.mean() * 1e3:.2f}", f"{spent.mean() * 1e3:.2f}",
                 f"{spent.max() * 1e3:.0f}", f"{reading_kb('VmRSS') / 1e3:.0f}",
                 f"{len(living(slam.network.cells)[0])}",
                 f"{np.sqrt((errors**2).mean()) * 1e2:.1f}", f"{(errors > LOST_M).mean():.1%}",
+                f"{doubted.mean():.2%}",
             )  # fmt: skip
             print("| " + " | ".join(told) + " |", flush=True)
             due_ns, row = due_ns + ROW_NS, []
@@ -80,7 +81,8 @@ if __name__ == "__main__":
     parser = argparse.ArgumentParser(description=__doc__)
     parser.add_argument("log", nargs="?", type=Path)
     parser.add_argument("--hours", type=float, default=2.0)
+    parser.add_argument("--seed", type=int, default=SEED, help="of the station")
     asked = parser.parse_args()
-    full = Simulation("station", seed=SEED, dynamism=0.0, motion=1.0)
+    full = Simulation("station", seed=asked.seed, dynamism=0.0, motion=1.0)
     endless = tour(full, 1e7) if asked.log is None else there_and_back(asked.log)
     measure(endless, asked.hours)

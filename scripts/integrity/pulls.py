@@ -12,16 +12,18 @@ less what is said of them, over all ways.
 
 import argparse
 import math
-from collections.abc import Callable, Iterator, Sequence
-from functools import partial
+import sys
+from collections.abc import Callable, Sequence
 from pathlib import Path
 
 import numpy as np
 
 from scripts import workers
+from scripts.console import ended
 from scripts.integrity.plane import frames
 from scripts.integrity.ways import Case
 from scripts.marks import fill_page, table
+from scripts.options import whole
 from slam import se2
 from slam.frames import Float
 from slam.frontend.odometry_prior import Prediction
@@ -60,12 +62,15 @@ class _Recorder(Agreement):
         self.told.append((Agreement.hold, (old.copy(), elapsed_s)))
         super().hold(old, elapsed_s)
 
+    def turned(self, by: float) -> None:
+        self.told.append((Agreement.turned, (by,)))
+        super().turned(by)
+
     def take(
-        self, prediction: Prediction, T_map_robot: Float, vote: float, *, in_doubt: bool = False
+        self, prediction: Prediction, T_map_robot: Float, vote: float, in_doubt: bool = False
     ) -> None:
-        if not in_doubt:
-            self.told.append((Agreement.take, (prediction, T_map_robot.copy(), vote)))
-        super().take(prediction, T_map_robot, vote, in_doubt=in_doubt)
+        self.told.append((Agreement.take, (prediction, T_map_robot.copy(), vote, in_doubt)))
+        super().take(prediction, T_map_robot, vote, in_doubt)
 
     def undragged(self, T_map_robot: Float) -> Float:
         kept = list(self.told)
@@ -81,7 +86,8 @@ def recorded(case: Case) -> list[Event]:
     events: list[Event] = []
     before = T_map_before = np.zeros(3)
     for frame in stream:
-        slam.update(frame.without_truth())
+        estimate = slam.update(frame.without_truth())
+        T_map_before = T_map_before + estimate.diagnostics["correction"]  # the map was moved
         assert stream[0].truth is not None
         assert frame.truth is not None
         truth, pose = se2.between(stream[0].truth, frame.truth), slam._T_map_robot
@@ -113,22 +119,15 @@ def variances(events: Sequence[Event], pull: Pull) -> Float:
     return out + latest
 
 
-def _of_case(way: str, pulls: Sequence[Pull], number: int) -> tuple[str, Float]:
+def _asked(asked: tuple[str, int]) -> tuple[str, Float]:
+    """A way, and the variances of its how-manieth stream by ``PULLS``."""
+    way, number = asked
     case = Case(way=way, number=number, slam="", first_seed=FIRST_SEED, seconds=SECONDS)
     events = recorded(case)
-    return way, np.array([variances(events, pull) for pull in pulls])
+    return way, np.array([variances(events, pull) for pull in PULLS.values()])
 
 
-def _each(wanted: argparse.Namespace) -> Iterator[tuple[str, Float]]:
-    asked = [(way, k) for k in range(wanted.each) for way in WAYS]
-    jobs = (partial(_of_case, way, list(PULLS.values()), k) for way, k in asked)
-    return workers.each(_call, list(jobs), jobs=wanted.jobs)
-
-
-def _call(job: Callable[[], tuple[str, Float]]) -> tuple[str, Float]:
-    return job()
-
-
+@ended
 def main() -> None:
     """Print a row for each way, and fill the page."""
     parser = argparse.ArgumentParser(description=__doc__.partition("\n")[0])
@@ -136,8 +135,11 @@ def main() -> None:
     parser.add_argument("--jobs", type=int, default=1)
     parser.add_argument("--page", type=Path, default=PAGE)
     wanted = parser.parse_args()
+    whole("--each", wanted.each, 1)
+    whole("--jobs", wanted.jobs, 1)
     sums = {way: np.zeros((len(PULLS), 3)) for way in WAYS}
-    for way, found in _each(wanted):
+    asked = [(way, number) for number in range(wanted.each) for way in WAYS]
+    for way, found in workers.each(_asked, asked, jobs=wanted.jobs):
         sums[way] += found
     each = 1e4 / (wanted.each * SECONDS / 60.0)
     rows = []
@@ -151,4 +153,4 @@ def main() -> None:
 
 
 if __name__ == "__main__":
-    main()
+    sys.exit(main())

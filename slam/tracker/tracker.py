@@ -184,6 +184,7 @@ class Tracker(abc.ABC):
         """Let the map see the frame, where the pose is believed.
 
         Returns what the observed surfaces said about it before, where the robot was tracked to it.
+        Old surface is noted in doubt, too: the first match after it needs that of now.
         """
         match, elapsed = judged.match, judged.prediction.elapsed
         T_map_robot, step = match.T_map_robot, min(elapsed, self.config.map.longest_look_s)

@@ -19,12 +19,13 @@ from slam.tracker.standing.config import StandingConfig
 
 
 class Pull(NamedTuple):
-    """Which share of a correction movers may have made: ``scripts.integrity.pulls``.
+    """Which share of a correction movers may have made.
 
-    held_s   s over which the old surface that scans saw is averaged
-    holds    weight (0.1 m each) of old surface that halves the share
-    few      share of the returns without weight with which the whole share is left to movers
-    lever_m  m: a heading is held by ``holds`` so far away
+    held_s   s over which the old surface that scans saw is averaged; set by hand
+    holds    weight (0.1 m each) of old surface that halves the share; ``scripts.integrity.pulls``
+    few      share of the returns without weight with which the whole share is left to movers; the
+             same
+    lever_m  m: a heading is held by ``holds`` so far away; set by hand
     """
 
     held_s: float = 0.5
@@ -33,8 +34,8 @@ class Pull(NamedTuple):
     lever_m: float = 0.5
 
 
-# Old surface, xx to tt, where the pose is in doubt, and what the map shows there with it: none. But
-# movers turn no robot.
+# Old surface (xx, xy, xt, yy, yt, tt; weights, times m and m^2) where the pose is in doubt. The map
+# may be wrong there, so it counts for no position. Movers turn no robot. Set by hand.
 IN_DOUBT = (0.0, 0.0, 0.0, 0.0, 0.0, 100.0)
 
 
@@ -93,10 +94,12 @@ class Agreement:
         )
 
     def take(
-        self, prediction: Prediction, T_map_robot: Float, vote: float, *, in_doubt: bool = False
+        self, prediction: Prediction, T_map_robot: Float, vote: float, in_doubt: bool = False
     ) -> None:
-        """The robot is matched to ``T_map_robot`` by returns of that mean vote; ``in_doubt``: not
-        to the map, which nobody knows to be there."""
+        """The robot is matched to ``T_map_robot`` by returns of that mean vote.
+
+        ``in_doubt``: to the local copy, while it is not known whether the map is right there.
+        """
         pulled = self._left_to_movers(vote, prediction.off(T_map_robot), in_doubt)
         (xx, xy, xt), (_, yy, yt), (_, _, tt) = prediction.covariance.tolist()
         self._elapsed_s = prediction.elapsed

@@ -14,7 +14,7 @@ from slam import LaserSpec, create, se2
 from slam.errors import InvalidValueError
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import NS_PER_S, Features, Frame, Odometry
-from slam.frontend.odometry_prior import HeadingBias, motion
+from slam.frontend.odometry_prior import HeadingBias, Prediction, motion
 from slam.frontend.odometry_steps import MotionSum
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -205,3 +205,13 @@ def test_a_wheel_that_slips_teaches_nothing() -> None:
     before = bias.per_m
     bias.learn(np.array([0.15, 0.0, 0.0]), 0.2, (SAID**2, SAID**2), (1.0, 10.0 * SAID, WELL))
     assert bias.per_m == before
+
+
+def test_a_changed_prediction_keeps_nothing_that_was_computed_of_the_one_before() -> None:
+    first = Prediction(
+        T_map_robot=np.zeros(3), increment=np.zeros(3), covariance=np.eye(3),
+        twist=np.zeros(3), elapsed=0.1,
+    )  # fmt: skip
+    assert first.prior == pytest.approx(np.eye(3))
+    assert first.changed(carried=2.0 * np.eye(3)).prior == pytest.approx(3.0 * np.eye(3))
+    assert first.prior == pytest.approx(np.eye(3))
