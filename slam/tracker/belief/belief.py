@@ -59,6 +59,7 @@ class Belief:
 
     p_lost  probability that the pose is wrong
     status  what may be wrong
+    busy    share of the latest scan's time that searches for the robot took, roughly: 0, 1/2 or 1
     """
 
     def __init__(
@@ -78,7 +79,7 @@ class Belief:
         self._matcher, self._match, self._usual = matcher, match, usual
         self._odds = Odds(config.belief, config.carried_per_h)
         self._episode: Episode | None = None
-        self.p_lost, self.status = 0.0, Status.TRACKING
+        self.p_lost, self.status, self.busy = 0.0, Status.TRACKING, 0.0
         self._p_off = 0.0  # that the robot is not where its motion led
         self._likeliest: int | None = None  # of the places that are followed, if one is
         self._since_near_s = np.inf
@@ -105,6 +106,7 @@ class Belief:
     ) -> Judged:
         """Where the robot is; ``T_map_before``: where it was at the scan before."""
         self._since_near_s += prediction.elapsed
+        self.busy = 0.0 if self._episode is None else 1.0
         before, self._latest = self._latest, observations.with_votes(None)
         if not len(observations.points_robot):
             return self._blind(cell_map, prediction)
@@ -214,7 +216,7 @@ class Belief:
         numbers = self._numbers
         if self._since_near_s < numbers.again_near_s or observations.weight < numbers.least_near:
             return
-        self._since_near_s = 0.0
+        self._since_near_s, self.busy = 0.0, max(self.busy, 0.5)
         everyone = observations.with_votes(None)
         every = max(1, len(everyone.points_robot) // numbers.near_points)
         points, weights = everyone.points_robot[::every], everyone.weights[::every] * every

@@ -26,6 +26,7 @@ from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.tracking.anchors import map_errors
 from slam.tracker.tracking.closures import Closures
+from slam.tracker.tracking.config import MANY
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.merging import LEFT, MOST_KEYS, Merge
 from slam.tracker.tracking.passages import Passages
@@ -89,18 +90,19 @@ class Loops(KeyFrames):
         """Loops found so far."""
         return [*self._edges.values()]
 
-    def work(self) -> None:
-        """Up to ``LoopsConfig.work`` units and a piece, fewer where frames come often."""
+    def work(self, part: float = 1.0) -> None:
+        """Up to ``LoopsConfig.work`` units and a piece, fewer where frames come often.
+
+        Below 1, only such a ``part`` of it: what is left is for the next call.
+        """
         if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
         share = self.keys[-1].start_s / self.keys[-1].frame / RARE_S
         spent, most = self._owed, self._numbers.work * min(max(share, 1.0 / 3.0), 1.0)
-        self._owed = 0
-        while spent < most:
+        while spent < part * most:
             cost = self._task()
-            if cost == 0:
-                break
-            spent += cost
+            spent += cost or MANY
+        self._owed = spent if part < 1.0 else 0
 
     def correction(self, poses: Callable[[], Float]) -> Correction | None:
         """The new map, if one is ready, with all (n, 3) ``poses()`` moved into it."""
