@@ -1,23 +1,22 @@
 # SPDX-License-Identifier: Apache-2.0
 """Pose graph in the plane: least squares over relative poses, robust against wrong loops.
 
-Gauss-Newton with SciPy's sparse solver: graphs here are a few thousand poses in a chain with some
-loops, which it solves in milliseconds an iteration, and it is a dependency anyway. Loops get the
-Geman-McClure kernel with graduated non-convexity (Yang, Antonante, Tzoumas, Carlone 2020): at first
-all pull, then those that do not fit the others are let go of.
+Gauss-Newton: graphs here are some hundred poses in a chain with some loops, an iteration of which
+takes a fraction of a millisecond. Loops get the Geman-McClure kernel with graduated non-convexity
+(Yang, Antonante, Tzoumas, Carlone 2020): at first all pull, then those that do not fit the others
+are let go of.
 """
 
 import math
 from dataclasses import dataclass
 from functools import cached_property
-from typing import Any, TypeAlias
+from typing import TypeAlias
 
 import numpy as np
-from numpy.typing import NDArray
-from scipy import sparse
-from scipy.sparse.linalg import splu
 
 from slam import se2
+from slam._jit import inner, njit
+from slam.block_cholesky import Ints, Pattern, solve
 from slam.frames import Float
 from slam.frontend.odometry_prior import upper_inverted
 
@@ -25,7 +24,6 @@ INLIER = 11.3  # chi squared of 3 degrees of freedom, 99 %
 ROUNDS = 60
 STILL = 1e-5  # m or rad: largest step at which it has converged
 SHARPER = 1.4
-_SYMMETRIC: Any = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 Pose: TypeAlias = tuple[float, float, float]
 DIGITS = 6  # of m and rad that a solution has: those beyond follow the processor's algebra
 
@@ -65,30 +63,30 @@ class Relaxation:
         self.done = len(self.poses) < 2 or not edges
         if self.done:
             return
-        self._a = np.array([e.a for e in edges])
-        self._b = np.array([e.b for e in edges])
+        self._ends = np.array([(e.a, e.b) for e in edges])
         self._measured = np.array([e.T_a_b for e in edges])
         self._information = np.array([e.information for e in edges])
         self._robust = np.array([e.robust for e in edges])
         self._rounds = 0
-        self._normal = _Normal(len(self.poses), self._a, self._b)
-        squares = self._squares(self._residuals()[0])
-        self._mu = max(2.0 * float(squares[self._robust].max(initial=0.0)) / INLIER, 1.0)
-
-    def _residuals(self) -> tuple[Float, Float, Float]:
-        return _residuals(self.poses, self._a, self._b, self._measured)
-
-    def _squares(self, residuals: Float) -> Float:
-        return np.asarray(np.einsum("ni,nij,nj->n", residuals, self._information, residuals))
+        self._pattern = Pattern(len(self.poses), self._ends)
+        self._squares = np.empty(len(edges))
+        weigh(self.poses, self._ends, self._measured, self._information, self._squares)
+        most = float(self._squares[self._robust].max(initial=0.0))
+        self._mu = max(2.0 * most / INLIER, 1.0)
 
     def round(self) -> None:
         """One step of Gauss-Newton; the loops that do not fit lose weight."""
-        residuals, to_a, to_b = self._residuals()
+        weigh(self.poses, self._ends, self._measured, self._information, self._squares)
         scale = self._mu * INLIER
-        weights = (scale / (self._squares(residuals) + scale)) ** 2
-        self.weights = np.where(self._robust, weights, 1.0)
-        information = self.weights[:, None, None] * self._information
-        step = self._normal.step(residuals, np.concatenate([to_a, to_b], axis=2), information)
+        self.weights = np.where(self._robust, (scale / (self._squares + scale)) ** 2, 1.0)
+        of, blocks = self._pattern, np.zeros((len(self._pattern.rows), 3, 3))
+        pull = np.zeros((len(self.poses), 3))
+        lay_out(
+            self.poses, self._ends, self._measured, self._information, self.weights,
+            (of.place, of.starts, of.blocks), blocks, pull,
+        )  # fmt: skip
+        solve(of.starts, of.rows, blocks, pull[:-1])
+        step = np.where(of.place[:, None] < 0, 0.0, pull[of.place])
         self.poses += step
         self._rounds += 1
         still = self._mu == 1.0 and float(np.abs(step).max()) < STILL
@@ -110,67 +108,72 @@ def optimise(poses: Float, edges: list[Edge]) -> tuple[Float, Float]:
     return relaxation.poses, relaxation.weights
 
 
-def _residuals(poses: Float, a: Float, b: Float, measured: Float) -> tuple[Float, Float, Float]:
-    """(m, 3) between(a, b) minus measured, and its Jacobians (m, 3, 3) by poses a and b."""
-    A, d = poses[a], poses[b] - poses[a]
-    c, s = np.cos(A[:, 2]), np.sin(A[:, 2])
-    x, y = c * d[:, 0] + s * d[:, 1], c * d[:, 1] - s * d[:, 0]
-    out = np.stack([x, y, d[:, 2]], axis=1) - measured
-    out[:, 2] = se2.wrap_array(out[:, 2])
-    by_a, by_b = np.zeros((len(A), 3, 3)), np.zeros((len(A), 3, 3))
-    by_b[:, 0, 0], by_b[:, 0, 1], by_b[:, 1, 0], by_b[:, 1, 1], by_b[:, 2, 2] = c, s, -s, c, 1.0
-    by_a[:] = -by_b
-    by_a[:, 0, 2], by_a[:, 1, 2] = y, -x
-    return out, by_a, by_b
+@inner
+def _residual(A: Float, B: Float, T_a_b: Float, out: Float) -> tuple[float, float]:
+    """(3,) between(A, B) minus measured; cosine and sine of A's heading."""
+    c, s = math.cos(A[2]), math.sin(A[2])
+    dx, dy, turn = B[0] - A[0], B[1] - A[1], B[2] - A[2] - T_a_b[2]
+    out[0] = c * dx + s * dy - T_a_b[0]
+    out[1] = c * dy - s * dx - T_a_b[1]
+    out[2] = turn - math.tau * math.floor(turn / math.tau + 0.5)
+    return c, s
 
 
-class _Normal:
-    """The normal equations of poses 1..n-1: where their numbers lie is worked out once.
+@njit
+def weigh(poses: Float, ends: Ints, measured: Float, information: Float, squares: Float) -> None:
+    """``squares`` (m,): chi squared of the residual of each edge."""
+    r = np.empty(3)
+    for m in range(len(ends)):
+        _residual(poses[ends[m, 0]], poses[ends[m, 1]], measured[m], r)
+        total = 0.0
+        for i in range(3):
+            for j in range(3):
+                total += r[i] * information[m, i, j] * r[j]
+        squares[m] = total
 
-    Poses are eliminated by least degree, which leaves the factor of a map's graph sparse.
+
+@njit
+def lay_out(  # noqa: C901, PLR0913 (kernel)
+    poses: Float,
+    ends: Ints,
+    measured: Float,
+    information: Float,
+    weights: Float,
+    pattern: tuple[Ints, Ints, Ints],
+    blocks: Float,
+    pull: Float,
+) -> None:
+    """Normal equations of all edges, in the order of elimination: ``blocks`` (k, 3, 3) of the lower
+    triangle, ``pull`` (n, 3) the right side; both are 0 before.
     """
-
-    def __init__(self, n: int, a: NDArray[np.int64], b: NDArray[np.int64]) -> None:
-        ends = np.stack([a, b], axis=1)
-        rows, columns = np.repeat(ends, 2, axis=1).ravel(), np.tile(ends, 2).ravel()
-        ones = sparse.csc_matrix((np.ones(len(rows)), (rows, columns)), shape=(n, n))
-        ones = ones[1:, 1:] + len(rows) * sparse.eye(n - 1, format="csc")
-        place = np.full(n, -1)  # in the order of elimination; the first pose is held fast
-        place[1:] = splu(ones, permc_spec="MMD_AT_PLUS_A", **_SYMMETRIC).perm_c
-        self._place = place
-        self._pulled = (3 * ends[:, :, None] + np.arange(3)).ravel()
-        rows, columns = place[rows], place[columns]
-        self._free = (rows >= 0) & (columns >= 0)
-        numbers = np.append(columns[self._free] * n + rows[self._free], (n + 1) * np.arange(n - 1))
-        blocks, slots = np.unique(numbers, return_inverse=True)
-        columns, rows = np.divmod(blocks, n)
-        first = np.searchsorted(columns, np.arange(n))  # block of each column of blocks
-        high = np.diff(first)
-        # a column of blocks is three of numbers, each three times as high
-        i = np.arange(3)
-        at = 9 * first[columns] + 3 * (np.arange(len(blocks)) - first[columns])
-        at = at[:, None, None] + i[:, None] + 3 * i * high[columns, None, None]
-        self._at = at[slots[: 1 - n]].ravel()
-        self._indices = np.empty(9 * len(blocks), np.int32)
-        self._indices[at] = 3 * rows[:, None, None] + i[:, None]
-        starts = 9 * first[:-1, None] + 3 * i * high[:, None]
-        self._starts = np.append(starts.ravel(), len(self._indices)).astype(np.int32)
-        self._diagonal = at[rows == columns][:, i, i].ravel()
-
-    def step(self, residuals: Float, jacobian: Float, information: Float) -> Float:
-        """(n, 3) step of Gauss-Newton; ``jacobian`` (m, 3, 6) by both ends of each edge."""
-        m = len(residuals)
-        weighted = jacobian.transpose(0, 2, 1) @ information
-        blocks = (weighted @ jacobian).reshape(m, 2, 3, 2, 3).transpose(0, 1, 3, 2, 4)
-        values = np.bincount(self._at, blocks.reshape(4 * m, 9)[self._free].ravel())
-        values[self._diagonal] += 1e-9
-        H = sparse.csc_matrix((values, self._indices, self._starts))
-        pull = np.bincount(self._pulled, (weighted @ residuals[:, :, None]).ravel())
-        moves = np.zeros((len(self._place), 3))
-        moves[self._place] = -pull.reshape(-1, 3)
-        moved = splu(H, permc_spec="NATURAL", **_SYMMETRIC).solve(moves[:-1].ravel())
-        step: Float = np.append(moved, np.zeros(3)).reshape(-1, 3)[self._place]
-        return step
+    place, starts, own = pattern
+    r, J, W = np.empty(3), np.zeros((2, 3, 3)), np.empty((3, 3))  # J by pose a, by pose b
+    for m in range(len(ends)):
+        c, s = _residual(poses[ends[m, 0]], poses[ends[m, 1]], measured[m], r)
+        J[1, 0, 0], J[1, 0, 1], J[1, 1, 0], J[1, 1, 1], J[1, 2, 2] = c, s, -s, c, 1.0
+        J[0, 0, 0], J[0, 0, 1], J[0, 1, 0], J[0, 1, 1], J[0, 2, 2] = -c, -s, s, -c, -1.0
+        J[0, 0, 2], J[0, 1, 2] = r[1] + measured[m, 1], -(r[0] + measured[m, 0])
+        for k in range(2):
+            at = place[ends[m, k]]
+            if at < 0:
+                continue
+            for i in range(3):
+                for j in range(3):
+                    total = 0.0
+                    for q in range(3):
+                        total += J[k, q, i] * information[m, q, j]
+                    W[i, j] = weights[m] * total
+                for q in range(3):
+                    pull[at, i] -= W[i, q] * r[q]
+            for other in range(2):
+                to = place[ends[m, other]]
+                if to < 0 or to > at:
+                    continue  # the upper triangle
+                block = blocks[starts[at] if to == at else own[m]]
+                for i in range(3):
+                    for j in range(3):
+                        for q in range(3):
+                            block[i, j] += W[i, q] * J[other, q, j]
 
 
 def carried(before: Float, after: Float, at: Float, poses: Float) -> Float:
