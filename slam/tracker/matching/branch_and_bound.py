@@ -6,14 +6,20 @@ Of equally good candidates the one of the lowest heading, then row, then column 
 
 import math
 from dataclasses import dataclass
+from typing import Any
 
 import numpy as np
+from llvmlite.ir import IntType
+from numba import uint64
+from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 from slam.frames import Float
 
 SPAN = 8  # a block of 8 x 8 offsets is bounded, and scored, at once
+FULL = 257  # bytes of which 16 bits hold the sum
+LOW = np.uint64(0x00FF00FF00FF00FF)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -100,6 +106,18 @@ def _look_ahead(  # noqa: C901 (kernel)
                     ahead[top + r, column] = max(ahead[top + r, column], largest)
 
 
+@intrinsic  # type: ignore[untyped-decorator]  # numba has no types
+def _eight(_: Any, array: Any, at: Any) -> Any:
+    """Eight neighbouring values of a flat array of bytes in one number, the first in its lowest."""
+
+    def load(context: Any, builder: Any, signature: Any, args: Any) -> Any:
+        data = context.make_array(signature.args[0])(context, builder, args[0]).data
+        first = builder.gep(data, [args[1]])
+        return builder.load(builder.bitcast(first, IntType(64).as_pointer()), align=1)
+
+    return uint64(array, at), load
+
+
 @inner
 def open_block(
     field: NDArray[np.uint8], flat: NDArray[np.uint64], first: int, columns: int,
@@ -108,24 +126,21 @@ def open_block(
     """``sums`` (8, 8) of ``field``, which is flat and has so many ``columns``, under the points.
 
     ``flat`` (n,) their places in it, to which ``first`` is added, and the offsets from 0 to 7 each
-    way. Places are unsigned, so that no index can be negative: eight at once then take the time of
-    three.
+    way. Eight values are added at once, each in 16 bits, which hold the sum of ``FULL`` of them:
+    one by one takes five times as long. Places are unsigned, so that no index can be negative.
     """
     for a in range(SPAN):
         down = np.uint64(first + a * columns)
-        s0 = s1 = s2 = s3 = s4 = s5 = s6 = s7 = np.int32(0)
-        for k in range(len(flat)):
-            at = flat[k] + down
-            s0 += np.int32(field[at])
-            s1 += np.int32(field[at + np.uint64(1)])
-            s2 += np.int32(field[at + np.uint64(2)])
-            s3 += np.int32(field[at + np.uint64(3)])
-            s4 += np.int32(field[at + np.uint64(4)])
-            s5 += np.int32(field[at + np.uint64(5)])
-            s6 += np.int32(field[at + np.uint64(6)])
-            s7 += np.int32(field[at + np.uint64(7)])
-        sums[a, 0], sums[a, 1], sums[a, 2], sums[a, 3] = s0, s1, s2, s3
-        sums[a, 4], sums[a, 5], sums[a, 6], sums[a, 7] = s4, s5, s6, s7
+        sums[a] = 0
+        for start in range(0, len(flat), FULL):
+            some, even, odd = flat[start : start + FULL], np.uint64(0), np.uint64(0)
+            for k in range(len(some)):
+                values = _eight(field, some[k] + down)
+                even += values & LOW
+                odd += (values >> np.uint64(8)) & LOW
+            for b in range(0, SPAN, 2):
+                sums[a, b] += np.int64((even >> np.uint64(8 * b)) & np.uint64(0xFFFF))
+                sums[a, b + 1] += np.int64((odd >> np.uint64(8 * b)) & np.uint64(0xFFFF))
 
 
 @njit
