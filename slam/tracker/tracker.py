@@ -94,9 +94,9 @@ class Tracker(abc.ABC):
     def update(self, frame: Frame) -> Estimate:
         """One frame in seven steps: from odometry and scan to pose, covariance and map.
 
-        After them, a bounded part of the search for loops; what a long scan leaves of it, before
-        the next. A correction that is ready moves map and pose then; ``diagnostics`` say so:
-        "correction" and "T_map_odom" (docs/loops.md).
+        After them, a bounded part of the search for loops. A correction that is ready moves map
+        and pose before the next one; ``diagnostics`` say so: "correction" and "T_map_odom"
+        (docs/loops.md).
         Not converged while frozen, lost, or blind: a scan without a single return.
         """
         if self._before is None and self._pose_covariance.loaded is None:
@@ -116,8 +116,7 @@ class Tracker(abc.ABC):
         if state is State.TRACKING or not self._belief.certain:
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
         estimate = self._report(frame, match, state, trust, judged.likeliest)
-        if self._belief.busy < 1.0:
-            self._search_loops()
+        self._search_loops()
         return estimate
 
     def _first(self, frame: Frame) -> Estimate:
@@ -134,8 +133,8 @@ class Tracker(abc.ABC):
         return self._report(frame, match, self._belief.first(observations))
 
     def _search_loops(self) -> None:
-        """Not while the robot is searched for, which takes the time of a scan."""
-        if not self._belief.certain:
+        """Not in a scan in which the robot was searched for, which takes its time."""
+        if self._belief.busy == 1.0:
             return
         error = self._loops.map_error()
         if error is not None:
@@ -145,14 +144,7 @@ class Tracker(abc.ABC):
     def _correct(self) -> None:
         """Move into the map that loops have corrected, if it is ready."""
         self._path.moved_by = np.zeros(3)
-        if not self._belief.certain:
-            return
-        if self._belief.busy == 1.0:
-            self._belief.busy = 0.0
-            self._search_loops()
-        elif self._belief.busy > 0.0:
-            self._loops.work()
-        if not self._trusted:
+        if not (self._belief.certain and self._trusted):
             return
         correction = self._loops.correction(self._path.poses)
         if correction is None:

@@ -126,7 +126,7 @@ class Belief:
         episode = self._begun(cell_map, observations, prediction, match, gone)
         if self._p_off <= self._config.frozen_above:
             return self._settled(cell_map, match, prediction)
-        self._episode, episode.matched = episode, True
+        self._episode, episode.matched, self.busy = episode, True, 1.0
         self._usual.follow(match, observations, prediction.elapsed)
         episode.places.remember(self._latest)
         episode.write(observations, match.T_map_robot, prediction.elapsed)

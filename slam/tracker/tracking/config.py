@@ -63,7 +63,7 @@ class LoopsConfig(Settings):
     early: float = number(0.5, "share", "of long_m from which on key frames are chained", high=1.0)
     corrects: int = number(1, "1", "1: map and pose follow the graph; 0: past poses alone", high=1)
     work: int = number(
-        72, "units", "of work a scan; one: a key frame drawn, 0.2 ms of an EPYC core",
+        64, "units", "of work a scan; one: a key frame drawn, 0.2 ms of an EPYC core",
         "docs/loops.md", low=1, high=MANY,
     )  # fmt: skip
     agree_m: float = number(0.3, "m", "a closure farther off needs another that agrees", low=1e-6)

@@ -26,7 +26,6 @@ from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.tracking.anchors import map_errors
 from slam.tracker.tracking.closures import Closures
-from slam.tracker.tracking.config import MANY
 from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.merging import LEFT, MOST_KEYS, Merge
 from slam.tracker.tracking.passages import Passages
@@ -34,6 +33,7 @@ from slam.tracker.tracking.pausing import Pausing
 from slam.tracker.tracking.redraw import Correction, Redrawing, torn_keys
 
 RARE_S = 0.3  # s between frames in the mean, from which on each gets all work; set by hand
+NEVER = np.full(3, np.inf)  # where a key frame was tied that was not
 _log = logging.getLogger(__name__)
 
 
@@ -90,19 +90,19 @@ class Loops(KeyFrames):
         """Loops found so far."""
         return [*self._edges.values()]
 
-    def work(self, part: float = 1.0) -> None:
-        """Up to ``LoopsConfig.work`` units and a piece, fewer where frames come often.
-
-        Below 1, only such a ``part`` of it: what is left is for the next call.
-        """
+    def work(self, spare: float = 1.0) -> None:
+        """Up to ``LoopsConfig.work`` units and a piece, fewer where frames come often or only a
+        ``spare`` share of a scan's time is left."""
         if self.way_m < self._numbers.early * self._numbers.long_m or len(self.keys) < 3:
             return
         share = self.keys[-1].start_s / self.keys[-1].frame / RARE_S
-        spent, most = self._owed, self._numbers.work * min(max(share, 1.0 / 3.0), 1.0)
-        while spent < part * most:
+        spent, most = self._owed, spare * self._numbers.work * min(max(share, 1.0 / 3.0), 1.0)
+        self._owed = 0
+        while spent < most:
             cost = self._task()
-            spent += cost or MANY
-        self._owed = spent if part < 1.0 else 0
+            if cost == 0:
+                break
+            spent += cost
 
     def correction(self, poses: Callable[[], Float]) -> Correction | None:
         """The new map, if one is ready, with all (n, 3) ``poses()`` moved into it."""
@@ -186,7 +186,7 @@ class Loops(KeyFrames):
         if solve or self._too_many():
             self._relaxed = list(self._edges)
             self._relaxation = Relaxation(np.array(self.poses), self._chain + self.edges)
-            return self._cost(96)
+            return self._cost(48)
         if self._ties:
             return self._go_on(Pausing(partial(self._tie, self._ties.popleft())))
         if len(self.poses) < len(self.keys):
@@ -194,7 +194,7 @@ class Loops(KeyFrames):
             return 1 + self.closures.spent
         if self._new_graph:
             self._follow()
-            return self._cost(256)
+            return self._cost(128)
         return self._look_again()
 
     def _go_on(self, task: Pausing) -> int:
@@ -272,7 +272,7 @@ class Loops(KeyFrames):
     def _relax(self, relaxation: Relaxation) -> int:
         if not relaxation.done:
             relaxation.round()
-            return self._cost(128)
+            return self._cost(1024)
         weights = relaxation.weights[len(self._chain) :].tolist()
         self.weights = dict(zip(self._relaxed, weights, strict=True))
         self.poses = list(relaxation.poses)
@@ -389,11 +389,11 @@ class Loops(KeyFrames):
             _, middle = self._later.popleft()
             self._ties.extend(range(middle - 1, middle + self._numbers.every - 1))
             return 1
-        for _ in range(len(self.poses)):
-            self._again = (self._again + 1) % len(self.poses)
-            tied, pose = self._tied[self._again], self.poses[self._again]
-            moved = math.inf if tied is None else math.hypot(*(pose - tied)[:2].tolist())
-            if moved > self._numbers.agree_m:
-                self._ties.append(self._again)
-                return 1
-        return 0
+        tied = np.array([NEVER if one is None else one for one in self._tied])
+        off = np.roll(np.array(self.poses) - tied, -self._again - 1, axis=0)
+        moved = np.flatnonzero(np.hypot(off[:, 0], off[:, 1]) > self._numbers.agree_m)
+        if not len(moved):
+            return 0
+        self._again = (self._again + 1 + int(moved[0])) % len(self.poses)
+        self._ties.append(self._again)
+        return 1

@@ -15,7 +15,7 @@ from slam.tracker.tracking.closures import DRAWN, draw
 from slam.tracker.tracking.config import LoopsConfig
 from slam.tracker.tracking.keys import KeyFrame
 
-FAR_M2 = 40.0  # of the range, mean square of what is seen: one unit more; museum, Intel, measured
+FAR_M2 = 20.0  # of the range, mean square of what is seen: one unit more; museum, Intel, measured
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("92eccca714b7", "a5815c0fd9d0")),
-        (OccupancyConfig, ["grid"], ("ae332a671335", "1120af3a5dea")),
+        (ShuntingConfig, [], ("53b5202c61e0", "b84b650044cf")),
+        (OccupancyConfig, ["grid"], ("47c0fbabebf5", "005b1430af2a")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
