@@ -8,7 +8,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
-from slam.frontend.polar import bearing, bin_of
+from slam.frontend.polar import BEARING_OFF, bearing, bin_of
 from slam.frontend.surfaces import apart
 
 
@@ -31,15 +31,36 @@ class Asking(NamedTuple):
 
 
 @inner
-def _passed(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
-    """Whether all beams within the spread went on beyond (x, y) (laser axes) by the margin."""
-    end = math.sqrt(x * x + y * y) + of.margin
+def _wrapped(k: int, bins: int) -> int:
+    """k % bins, of one that lies at most once round from it: a division takes longer than a bin."""
+    if k < 0:
+        return k + bins
+    return k - bins if k >= bins else k
+
+
+@inner
+def _bin(turns: float, of: Asking, x: float, y: float, shift: float) -> int:
+    """``bin_of`` (x, y), whose bearing is so many bins round."""
+    k, slack = math.floor(turns + shift), BEARING_OFF / of.step
+    if slack < turns + shift - k < 1.0 - slack:
+        return k
+    return math.floor(math.atan2(y, x) / of.step + shift)
+
+
+@inner
+def _passed(
+    limit: NDArray[np.float64], of: Asking, x: float, y: float, r: float, turns: float
+) -> bool:
+    """Whether all beams within the spread went on beyond (x, y) (laser axes) by the margin.
+
+    ``r`` m away, and so many bins round by ``bearing``.
+    """
+    end = r + of.margin
     bins, wide = len(limit), of.spread / of.step
-    if wide >= 1.1:  # most did not: the middle one shows it
-        k = bin_of(x, y, of.step, 0.5)
-        if limit[k + bins if k < 0 else (k - bins if k >= bins else k)] < end:
-            return False
-    first, last = bin_of(x, y, of.step, 0.5 - wide), bin_of(x, y, of.step, 0.5 + wide)
+    # most did not: the middle one shows it
+    if wide >= 1.1 and limit[_wrapped(_bin(turns, of, x, y, 0.5), bins)] < end:
+        return False
+    first, last = _bin(turns, of, x, y, 0.5 - wide), _bin(turns, of, x, y, 0.5 + wide)
     k = first % bins
     for _ in range(last + 1 - first):
         if limit[k] < end:
@@ -49,18 +70,40 @@ def _passed(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
 
 
 @inner
-def _in_view(limit: NDArray[np.float64], of: Asking, x: float, y: float) -> bool:
-    """Whether nothing hid (x, y) (laser axes), and a beam came that way.
+def _in_view(limit: NDArray[np.float64], of: Asking, r: float, turns: float) -> bool:
+    """Whether nothing hid a place ``r`` m away, and a beam came that way.
 
     The widest of three bins: at a wall that is seen at a grazing angle each falls short of it.
     """
-    bins, end = len(limit), math.sqrt(x * x + y * y) - of.margin
-    k = math.floor(bearing(x, y) / of.step + 0.5)
+    bins, end = len(limit), r - of.margin
+    k = math.floor(turns + 0.5)
     for b in (k - 1, k, k + 1):
-        free = limit[b % bins]
+        free = limit[_wrapped(b, bins)]
         if free > 0.0 and end < free:
             return True
     return False
+
+
+@inner
+def _polar(
+    points: NDArray[np.float64], seen_from: tuple[float, float, float, float],
+    laser: NDArray[np.float64], step: float, polar: NDArray[np.float64],
+) -> None:  # fmt: skip
+    """Where points are about a laser: ``polar`` (4, at least n) x, y, distance, and how many bins
+    round by ``bearing``. In a loop of its own, which takes several at once.
+
+    ``seen_from`` a pose: its place, cosine and sine
+    """
+    px, py, c, s = seen_from
+    lx, ly, lc, ls = laser[0], laser[1], math.cos(laser[2]), math.sin(laser[2])
+    xs, ys, reach, around = polar[0], polar[1], polar[2], polar[3]
+    for k in range(len(points)):
+        x = c * points[k, 0] - s * points[k, 1] + px
+        y = s * points[k, 0] + c * points[k, 1] + py
+        dx, dy = x - lx, y - ly
+        u, v = lc * dx + ls * dy, lc * dy - ls * dx
+        xs[k], ys[k] = u, v
+        reach[k], around[k] = math.sqrt(u * u + v * v), bearing(u, v) / step
 
 
 @inner
@@ -72,7 +115,8 @@ def _emptied(  # noqa: PLR0913 (kernel)
     ages: NDArray[np.float64],
     of: Asking,
     recent: int,
-    turns: NDArray[np.float64],
+    polar: NDArray[np.float64],
+    seen: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> int:
     """Age of the newest scan that saw the place of each point (robot frame) empty, else inf.
@@ -80,25 +124,23 @@ def _emptied(  # noqa: PLR0913 (kernel)
     Returns the number of points whose places any of them had in view.
 
     lasers  (J, 3) in the map, ``limits`` (J, bins) free ranges as in ``View``, newest first, of
-    which the first few, ``recent``, are asked; ``turns``: room for their cosines and sines
+    which the first few, ``recent``, are asked; ``polar``, ``seen``: room to work in
     """
-    c, s = math.cos(pose[2]), math.sin(pose[2])
+    n, in_view = len(points), 0
+    seen_from = (pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2]))
+    for k in range(n):
+        out[k], seen[k] = math.inf, 0.0
     for j in range(recent):
-        turns[2 * j], turns[2 * j + 1] = math.cos(lasers[j, 2]), math.sin(lasers[j, 2])
-    in_view = 0
-    for k in range(len(points)):
-        x = c * points[k, 0] - s * points[k, 1] + pose[0]
-        y = s * points[k, 0] + c * points[k, 1] + pose[1]
-        out[k], seen = math.inf, False
-        for j in range(recent):
-            dx, dy = x - lasers[j, 0], y - lasers[j, 1]
-            cosine, sine = turns[2 * j], turns[2 * j + 1]
-            u, v = cosine * dx + sine * dy, cosine * dy - sine * dx
-            seen = seen or _in_view(limits[j], of, u, v)
-            if _passed(limits[j], of, u, v):
+        _polar(points, seen_from, lasers[j], of.step, polar)
+        for k in range(n):
+            if out[k] < math.inf:
+                continue
+            r, turns = polar[2, k], polar[3, k]
+            if seen[k] == 0.0 and _in_view(limits[j], of, r, turns):
+                seen[k] = 1.0
+                in_view += 1
+            if _passed(limits[j], of, polar[0, k], polar[1, k], r, turns):
                 out[k] = ages[j]
-                break
-        in_view += seen
     return in_view
 
 
@@ -134,6 +176,7 @@ def _left(  # noqa: PLR0913 (kernel)
     of: Asking,
     first: NDArray[np.int64],
     last: NDArray[np.int64],
+    polar: NDArray[np.float64],
     out: NDArray[np.float64],
 ) -> None:
     """Lower ``out`` to ``age`` for points within ``left_m`` of a place that was left.
@@ -144,20 +187,18 @@ def _left(  # noqa: PLR0913 (kernel)
     """
     near = of.left_m
     bins = len(limit)
-    c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     lc, ls = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
+    _polar(before, (0.0, 0.0, 1.0, 0.0), T_map_laser, of.step, polar)
     for i in range(len(before)):
-        gx, gy = before[i, 0] - T_map_laser[0], before[i, 1] - T_map_laser[1]
-        u, v = c * gx + s * gy, c * gy - s * gx
-        if not _passed(limit, of, u, v):
+        u, v, r, around = polar[0, i], polar[1, i], polar[2, i], polar[3, i]
+        if not _passed(limit, of, u, v, r, around):
             continue
         x, y = lc * u - ls * v + T_robot_laser[0], ls * u + lc * v + T_robot_laser[1]
-        r = math.sqrt(u * u + v * v)
-        middle = bin_of(u, v, of.step, 0.5)
+        middle = _bin(around, of, u, v, 0.5)
         # 1.6 > pi / 2: asin(q) is below 1.6 q for q in [0, 1]
         wide = math.floor(min(near / max(r, near), 1.0) * 1.6 / of.step) + 1
         for b in range(middle - wide, middle + wide + 1):
-            at = b % bins
+            at = _wrapped(b, bins)
             if first[at] < 0:
                 continue
             for k in range(first[at], last[at] + 1):
@@ -226,21 +267,21 @@ def votes(  # noqa: PLR0913 (kernel)
     limit   (bins,) free ranges of the present scan, seen from ``T_map_laser``
     lasers, limits, ages, recent  of the scans asked, see ``_emptied``
     before  (m, 2) points in the map of those whose things may have left; ends (L,) of each scan's
-    scratch (4, at least n + 1 and 2 J), bins (2, bins): room to work in
+    scratch (6, at least n + 1, and points of any scan before), bins (2, bins): room to work in
     """
     n = len(points)
-    stood, own, first, last = scratch[0], scratch[1], bins[0], bins[1]
-    in_view = _emptied(points, pose, lasers, limits, ages, of, recent, scratch[2], stood)
+    stood, own, polar, first, last = scratch[0], scratch[1], scratch[2:], bins[0], bins[1]
+    in_view = _emptied(points, pose, lasers, limits, ages, of, recent, polar, own, stood)
     _indexed(points, T_robot_laser, of.step, first, last)
     start = 0
     for j in range(len(ends)):
         _left(
             before[start : ends[j]], ages[j], points, T_map_laser, T_robot_laser, limit, of,
-            first, last, stood,
+            first, last, polar, stood,
         )  # fmt: skip
         start = ends[j]
     for k in range(n):
         ratio = of.settled_s / max(stood[k], 1e-300)
         own[k] = 1.0 - of.sure * (1.0 - 1.0 / (1.0 + ratio * ratio))
-    _along(points, joined, own, of.along_m, of.thin_m, scratch[3], out)
+    _along(points, joined, own, of.along_m, of.thin_m, scratch[2], out)
     return in_view / n

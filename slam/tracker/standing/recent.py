@@ -119,7 +119,7 @@ class Standing:
         )
         newest = sum(age <= config.left_s for age in ages)
         lately = [look.points_map for look in asked[:newest]]
-        limit, width = seen.view.limit, max(len(points) + 1, 2 * len(asked))
+        limit, width = seen.view.limit, max(map(len, [*lately, points])) + 1
         out = np.empty(len(points))
         in_view = votes(
             points, seen.joined, limit, T_map_robot,
@@ -129,6 +129,6 @@ class Standing:
             sum(age <= config.came_s for age in ages),
             np.concatenate(lately) if lately else NO_POINTS,
             np.array(list(accumulate(map(len, lately))), np.int64), asking,
-            np.empty((4, width)), np.empty((2, len(limit)), np.int64), out,
+            np.empty((6, width)), np.empty((2, len(limit)), np.int64), out,
         )  # fmt: skip
         return seen.with_votes(out, in_view)
