@@ -259,12 +259,11 @@ def _by_bearing(
     points: Float, beams: NDArray[np.int64], bearings: Float
 ) -> tuple[Float, NDArray[np.int64]]:
     """Of an interlaced scanner that turns: neighbours are those by bearing, not by number."""
-    n = len(bearings)
-    rank = np.empty(n, np.int64)
-    rank[np.argsort(bearings, kind="stable")] = np.arange(n)
-    beams = rank[beams]
-    in_order = np.argsort(beams)
-    return points.take(in_order, axis=0), beams[in_order]
+    place = np.full(len(bearings), -1)  # of each beam among the points
+    place[beams] = np.arange(len(beams))
+    place = place[np.argsort(bearings, kind="stable")]
+    hits = np.flatnonzero(place >= 0)
+    return points.take(place[hits], axis=0), hits
 
 
 def from_features(features: Features, grain: Grain) -> Observations:

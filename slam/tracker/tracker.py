@@ -245,12 +245,12 @@ class Tracker(abc.ABC):
             motion, covariance = prediction.increment, prediction.covariance
         self._trusted = found or state is State.TRACKING
         covariance = turned(covariance, -float(self._T_map_robot[2]))
-        everyone = observations.with_votes(None)
         written = state is State.TRACKING or (found and judged.writes)
         elapsed, T_map_robot = prediction.elapsed, match.T_map_robot
         self._loops.add(
-            T_map_robot, motion, covariance, everyone, elapsed=elapsed, written=written, found=found
-        )
+            T_map_robot, motion, covariance, observations, elapsed=elapsed, written=written,
+            found=found,
+        )  # fmt: skip
 
     def _report(
         self, frame: Frame, match: Match, state: State, trust: float = 1.0,
@@ -359,7 +359,7 @@ class Tracker(abc.ABC):
         loaded = state.covariance + coarse(config.tracking.relocalise)
         slam._pose_covariance.resumed(state.covariance, loaded)
         slam._loops.hold()
-        slam._matcher.usual.matches.extend(state.usual)
+        slam._matcher.usual.know(state.usual)
         return slam
 
     def hold_map(self) -> None:

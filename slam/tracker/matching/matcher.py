@@ -154,15 +154,23 @@ class Usual:
         self._config = config
         self.matches: deque[float] = deque(matches, maxlen=config.remembered)
         self._rewarded, self._overlapped = 0.0, 0.0
+        self._median: float | None = None  # asked for thrice a scan
 
     @property
     def match(self) -> float:
         """Median matched fraction."""
-        return median(self.matches) if self.matches else 1.0
+        if self._median is None:
+            self._median = median(self.matches) if self.matches else 1.0
+        return self._median
+
+    def know(self, matches: Sequence[float]) -> None:
+        """So scans of before matched."""
+        self.matches.extend(matches)
+        self._median = None
 
     def learn(self, match: Match, elapsed: float) -> None:
         """The map took in a scan, so many s after the one before."""
-        self.matches.append(match.matched)
+        self.know([match.matched])
         self._rewarded += self._forgotten(elapsed) * (match.rewarded - self._rewarded)
 
     def follow(self, match: Match, observations: Observations, elapsed: float) -> None:
