@@ -246,7 +246,7 @@ def best_of(of: Lattice) -> Found:
     bounds = np.empty((len(of.turns), across, across))
     costs = _heading_costs(of.precision, of.turns)
     _bound(of.ahead, of.bases, costs, of.reach, of.gain, bounds)
-    order = np.argsort(-bounds.ravel(), kind="stable")
+    order = np.argsort(-bounds.ravel())  # alike ones are all opened, or none
     score, scored = _descend(
         of.field, of.bases, of.turns, of.reach, of.pitch, of.precision, of.gain,
         bounds, order, index,
