@@ -37,6 +37,7 @@ DOCS = ROOT / "docs"
 _COUNTS = {True: "yes", False: "no", None: "open"}
 PAGE, BOARD = "benchmark.md", "leaderboard.md"
 PERCENT = 100.0
+SHORT = 8  # digits of a commit
 APART = 4.2  # percent between two names at the ends of their lines
 _COLORS = ("#ce2c3c", "#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#5d8a1e", "#b8418f", "#2f9fd0",
            "#a0583c", "#3b2f7d", "#59616e", "#de6e18")  # fmt: skip
@@ -73,9 +74,14 @@ def shipped(of: Published) -> str:
     """The ranking, and what it is of."""
     board = board_of(of)
     made, on = of.made_with, of.made_with["machine"]["processor"]
+    rows = [
+        [*cells, ", ".join(commit[:SHORT] for commit in of.commits(cells[1], board.tracks))]
+        for cells in board.ranked()
+    ]
     return (
-        f"{table(RANKED_HEADS, board.ranked(), left=2)}\n\n{_ranked_runs(board)}; "
-        f"commit {made['commit']}, {on}, MuJoCo {made['versions']['mujoco']}."
+        f"{table([*RANKED_HEADS, 'commits'], rows, left=2)}\n\n{_ranked_runs(board)}; "
+        f"{on}, MuJoCo {made['versions']['mujoco']}. Commits are those that made that SLAM's rows, "
+        "of all runs that ship, the first the most."
     )
 
 

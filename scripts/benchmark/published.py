@@ -6,10 +6,15 @@ Each recording is named by its digest, so that nothing is compared on other scan
 
     python -m scripts.benchmark.published out/quick out/top --commit HASH   # writes published.json
     python -m scripts.benchmark.published out/top --run shunting --levels 1 --seeds 20
+
+Each row says which commit made it: rows that are not in the folders, or not of ``--only SLAM``,
+stay as they are.
 """
 
 import argparse
+import re
 import sys
+from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -39,11 +44,12 @@ from sim.core.versions import WORLD, world_of
 from slam.errors import InvalidValueError, LogFormatError
 
 FILE = Path(__file__).with_name("published.json")
-SCHEMA, WHAT = 1, "published runs of the benchmark of mobilia"
-COLUMNS = (
+SCHEMA, WHAT = 2, "published runs of the benchmark of mobilia"
+CELLS = (
     "outcome", "lost", "lost_at_s", "error_tracking_m", "ate_unaligned_m", "rpe_m_per_m",
     "silent_share",
 )  # fmt: skip
+COLUMNS = (*CELLS, "commit")
 MAX_SLAMS = 100
 Row = dict[str, Any]
 Digests = Mapping[tuple[float, int], str]  # of recordings, by level and seed
@@ -53,7 +59,7 @@ Digests = Mapping[tuple[float, int], str]  # of recordings, by level and seed
 class Published:
     """Runs by track, then by level and seed: the digest of the recording, and a row of each SLAM.
 
-    made_with  commit, versions, machine
+    made_with  versions and machine; where there were several, a list with commas
     """
 
     runs: Mapping[str, Mapping[tuple[float, int], tuple[str, Mapping[str, Row]]]]
@@ -77,11 +83,22 @@ class Published:
         own = self.runs.get(track, {})
         there = [run for run, digest in digests.items() if run in own and own[run][0] == digest]
         return [
-            {"slam": slam, "dynamism": run[0], "seed": run[1], "failure": None, **row}
+            {
+                "slam": slam, "dynamism": run[0], "seed": run[1], "failure": None,
+                **{name: row[name] for name in CELLS},
+            }
             for run in there
             for slam, row in own[run][1].items()
             if slam not in without
-        ]
+        ]  # fmt: skip
+
+    def commits(self, slam: str, tracks: Iterable[Track]) -> list[str]:
+        """Those that made its rows of these tracks, whichever made the most first."""
+        made = Counter(
+            slams[slam]["commit"]
+            for track in tracks for _, slams in self.runs[track.name].values() if slam in slams
+        )  # fmt: skip
+        return [commit for commit, _ in made.most_common()]
 
     def others(self, track: str, digests: Digests) -> int:
         """How many of these recordings have another digest here."""
@@ -132,11 +149,18 @@ def digests(plan: Plan, folder: Path) -> dict[tuple[float, int], str]:
     return {(run.dynamism, run.seed): digest(file) for run, file in files.items()}
 
 
-def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
+def write_from(
+    folders: Sequence[Path], path: Path, commit: str, only: Sequence[str] | None = None
+) -> Published:
     """Of folders of ``mobilia benchmark``, all tracks that are whole in them, beside what is there.
 
-    Raises ``InvalidValueError`` for two folders whose recordings differ.
+    commit  of the code that made their rows
+    only    SLAMs whose rows are taken; None: all
+
+    Raises ``InvalidValueError`` for two folders whose recordings differ, and what is no commit.
     """
+    if not _COMMIT.holds(commit):
+        raise InvalidValueError(f"--commit must be {_COMMIT.wanted}, got {commit!r:.80}")
     before: dict[str, Any] = load(path, WHAT, SCHEMA) if path.exists() else {}
     runs, hashes = dict[str, Row](before.get("runs", {})), dict[str, str](before.get("tracks", {}))
     for folder, track in product(folders, TRACKS.values()):
@@ -147,19 +171,27 @@ def write_from(folders: Sequence[Path], path: Path, commit: str) -> Published:
         hashes[track.name] = track.sha256
         plan = track.plan(asked["slams"], tuple(asked["seeds"]), levels=tuple(asked["levels"]))
         for at, scans in digests(plan, folder / track.name).items():
-            own = {r["slam"]: [_short(r.get(k)) for k in COLUMNS]
-                   for r in rows if (r["dynamism"], r["seed"]) == at}  # fmt: skip
+            own = {r["slam"]: [*(_short(r.get(k)) for k in CELLS), commit]
+                   for r in rows if (r["dynamism"], r["seed"]) == at
+                   and (only is None or r["slam"] in only)}  # fmt: skip
             key = f"{track.name} {at[0]:g} {at[1]}"
             there = runs.setdefault(key, {"recording": scans, "slams": {}})
             if there["recording"] != scans:
                 raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
             there["slams"] |= own
-    made: Row = {"commit": commit, "versions": versions(), "machine": machine()}
-    told = [of["machine"]["processor"] for of in (before.get("made_with", made), made)]
-    made["machine"]["processor"] = ", ".join(dict.fromkeys(", ".join(told).split(", ")))
+    made: Row = {"versions": versions(), "machine": machine()}
+    earlier = before.get("made_with", made)
+    made["versions"] = {k: _each(earlier["versions"].get(k, v), v) for k, v in versions().items()}
+    processor = (of["machine"]["processor"] for of in (earlier, made))
+    made["machine"]["processor"] = _each(*processor)
     head = {"schema": SCHEMA, "what": WHAT, "world": WORLD, "made_with": made, "columns": COLUMNS}
     write(path, head, {"tracks": hashes, "runs": runs})
     return read(path)
+
+
+def _each(*told: str) -> str:
+    """Of lists with commas, each entry once."""
+    return ", ".join(dict.fromkeys(", ".join(told).split(", ")))
 
 
 def _short(value: Any) -> Any:
@@ -171,7 +203,13 @@ _HEAD: Mapping[str, Rule] = {
     "columns": Rule(", ".join(COLUMNS), lambda value: value == list(COLUMNS)),
     "made_with": MADE_WITH,
 }
-_CELLS: Mapping[str, Rule] = {**RUN, "lost": number(most=1.0, whole=True)}
+_COMMIT = Rule(
+    "the hash of a commit, 7 to 40 digits",
+    lambda value: isinstance(value, str) and bool(re.fullmatch("[0-9a-f]{7,40}", value)),
+)
+_CELLS: Mapping[str, Rule] = {
+    **RUN, "lost": number(most=1.0, whole=True), "commit": _COMMIT,
+}  # fmt: skip
 _RUN: Mapping[str, Rule] = {
     **{key: RUN[key] for key in ("level", "seed", "recording")},
     "slams": Rule(
@@ -188,6 +226,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark, or --run")
     parser.add_argument("--out", type=Path, default=FILE)
     parser.add_argument("--commit", help="of the code that ran")
+    parser.add_argument("--only", nargs="+", metavar="SLAM", help="take only their rows")
     parser.add_argument("--run", nargs="+", metavar="SLAM", help="only run these into the folder")
     parser.add_argument("--tracks", nargs="+", help="default the newest of all")
     parser.add_argument("--levels", type=float, nargs="+", default=list(LEVELS))
@@ -205,7 +244,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         return
     if not wanted.commit:
         raise InvalidValueError("--commit must say of which code the runs are")
-    made = write_from(wanted.folders, wanted.out, wanted.commit)
+    made = write_from(wanted.folders, wanted.out, wanted.commit, wanted.only)
     print(f"{wanted.out}: {sum(map(len, made.runs.values()))} recordings")
 
 

@@ -5,6 +5,7 @@ import json
 from collections.abc import Callable
 from dataclasses import replace
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
 import numpy as np
@@ -17,7 +18,7 @@ from scripts.benchmark.scores import ranking
 from scripts.benchmark.tracks import LEVELS, TRACKS, chosen
 from scripts.comparison.plan import Plan
 from scripts.result_files import ROOT
-from slam.errors import LogFormatError
+from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.benchmark.test_scores import runs
 
 SHIPPED = published.read()
@@ -92,6 +93,9 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "outcome": (
         lambda d: d["runs"][KEY]["slams"]["karto"].__setitem__(0, "won"), "outcome must be",
     ),
+    "commit": (
+        lambda d: d["runs"][KEY]["slams"]["karto"].__setitem__(-1, "mine"), "commit must be",
+    ),
     "error": (
         lambda d: d["runs"][KEY]["slams"]["karto"].__setitem__(4, -1.0), "ate_unaligned_m must",
     ),
@@ -148,14 +152,48 @@ def test_a_readers_row_stands_between_the_others_and_no_oracle_runs_again(
     assert "6 of 6 recordings are others here" in " ".join((printed.out + printed.err).split())
 
 
-def test_a_processor_is_named_once_however_often_runs_are_added(
+def test_processors_and_versions_are_named_once_however_often_runs_are_added(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ):
     path = tmp_path / "published.json"
     for name in ("A", "B", "B", "A"):
         monkeypatch.setattr(published, "machine", lambda name=name: {"processor": name})
-        made = published.write_from([], path, "abc")
-    assert made.made_with["machine"]["processor"] == "A, B"
+        monkeypatch.setattr(published, "versions", lambda name=name: {"mujoco": name})
+        made = published.write_from([], path, "abcdef0")
+    assert made.made_with == {"machine": {"processor": "A, B"}, "versions": {"mujoco": "A, B"}}
+
+
+def test_rows_that_are_made_again_name_their_commit_and_no_other_row_does(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+):
+    path, track = tmp_path / "published.json", TRACKS[TRACK]
+    path.write_bytes(published.FILE.read_bytes())
+    (tmp_path / TRACK).mkdir()
+    (tmp_path / TRACK / "recipe.json").touch()
+    again = {(1.0, seed): digests(TRACK)[1.0, seed] for seed in track.test[:2]}
+    rows = [
+        {"slam": slam, "dynamism": at, "seed": seed, "outcome": "finished", "lost": 0}
+        for slam in ("shunting", "odometry", "mine") for at, seed in again
+    ]  # fmt: skip
+    asked = {"slams": ["shunting", "mine"], "seeds": track.test[:2], "levels": [1.0]}
+    done = SimpleNamespace(runs=rows, settings=asked)
+    monkeypatch.setattr(published, "compared", lambda folder: done)
+    monkeypatch.setattr(published, "digests", lambda plan, folder: again)
+    commit = "0123456789abcdef"
+    made = published.write_from([tmp_path], path, commit, only=["shunting", "mine"])
+    for name, own in SHIPPED.runs.items():
+        for at, (_, before) in own.items():
+            now = dict(made.runs[name][at][1])
+            if name == TRACK and at in again:
+                mine, shunting = now.pop("mine"), now.pop("shunting")
+                assert mine["commit"] == shunting["commit"] == commit
+                assert shunting["error_tracking_m"] is None
+            assert now.items() <= before.items()
+    assert made.commits("mine", [track]) == [commit]
+    assert made.commits("shunting", [track])[1:] == [commit]
+    assert commit[:8] in shipped(made)
+    with pytest.raises(InvalidValueError, match="commit must be the hash"):
+        published.write_from([], path, "0c42a0f (oracle(map): 02c3eff)")
 
 
 def test_what_is_ahead_is_what_runs():
