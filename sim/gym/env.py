@@ -2,6 +2,8 @@
 """The moving rooms as a Gymnasium environment."""
 
 from collections.abc import Sequence
+from concurrent.futures import Executor
+from copy import deepcopy
 from typing import Any
 
 import gymnasium
@@ -13,15 +15,14 @@ from scenes import SCAN_HEIGHT
 from sim.core.checks import one_of, switch, whole
 from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
-from sim.core.seeds import Seeds
-from sim.gym.goals import GOAL_RADIUS_M, REWARDS, Goal, Ground, Task, goal_of
+from sim.gym.begin import Ahead, begun
+from sim.gym.goals import GOAL_RADIUS_M, REWARDS, Goal, Task, goal_of
 from sim.gym.observation import MODES, Observation, Rendering, observed, space_of
 from sim.gym.options import checked_seed, checked_settings, clipped, episode
 from sim.gym.pose_source import PoseSource
 from sim.sensors.lidar.device import ScanResult
 from sim.sensors.lidar.registry import ScannerConfig
 from sim.simulation import Simulation
-from sim.world.world import World
 from slam.errors import MobiliaError
 from slam.frames import LaserSpec
 from slam.shaped import Positive, shaped
@@ -184,6 +185,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             pose_source = "odometry"
         self._pose_source = None if pose_source is None else PoseSource(pose_source)
         self._simulation: Simulation | None = None
+        self._ahead: Ahead | None = None
         self._task: Task | None = None
         self.contacts: list[Contact] = []  # what the robot touched during the last step
         self.action_space = spaces.Box(-1.0, 1.0, (2,), np.float32)
@@ -207,31 +209,29 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         """Build the scene again and take a first scan standing still."""
         plan = episode(self._settings, options, self._goal)
         super().reset(seed=checked_seed(seed))
-        own = Seeds(int(self.np_random.integers(2**31)), **plan.seeds)
-        simulation = Simulation(seed=own, **plan.settings)
-        task = self._task_of(plan.goal, simulation.world)
+        own = int(self.np_random.integers(2**31))
+        ahead, self._ahead = self._ahead, None
+        built = None if ahead is None else ahead.room(None if options else own)
+        room = built or begun(plan, own, self._reward)
         self._rendering.close()
-        self._simulation, self._task = simulation, task
-        if self._simulation.spec.n_beams != self._n_beams:
-            self._set_space(self._simulation.spec)
+        simulation = self._simulation = room.simulation
+        self._task, self.contacts = room.task, simulation.contacts
+        if simulation.spec.n_beams != self._n_beams:
+            self._set_space(simulation.spec)
         if self._pose_source is not None:
-            self._pose_source.reset(self._simulation.world.robot_pose())
-        simulation.live()
-        scan = self._look()
-        self.contacts = simulation.contacts
-        if task is not None:
-            task.begin(*self._place())
-        return self._observation(scan), self._info()
+            self._pose_source.reset(room.start)
+        self._hear()
+        return self._observation(room.scan), self._info()
 
-    def _task_of(self, goal: Goal | str | None, world: World) -> Task | None:
-        if goal is None:
-            return None
-        ground = Ground(world)
-        if isinstance(goal, str):
-            there = ground.drawn(world.seeds.generator("goals"))
-        else:
-            there = ground.checked(goal)
-        return Task(there, self._reward, ground)
+    def prepare(self, threads: Executor) -> None:
+        """Build the room that the next reset without a seed and options wants, on another thread.
+
+        Every byte is the same, whether this was called or not: the reset waits for what is being
+        built, builds itself what was not begun or failed, and drops what it does not want.
+        """
+        plan = episode(self._settings, None, self._goal)
+        seed = int(deepcopy(self.np_random).integers(2**31))
+        self._ahead = Ahead(seed, threads.submit(begun, plan, seed, self._reward))
 
     def step(
         self, action: NDArray[np.float32]
@@ -271,11 +271,14 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     def _look(self) -> ScanResult:
         """The scan of the time that has passed, of which the source of the pose hears too."""
         scan = self.simulation.look()
+        self._hear()
+        return scan
+
+    def _hear(self) -> None:
         if self._pose_source is not None:
             frame = self.simulation.frame
             assert frame is not None  # a scan was just taken
             self._pose_source.take(frame)
-        return scan
 
     def _place(self) -> tuple[float, float]:
         x, y, _ = self.simulation.world.robot_pose().tolist()
