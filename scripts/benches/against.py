@@ -174,13 +174,16 @@ def at_once(seconds: float) -> Iterator[Row]:
     """What two get done more than one, by the wall: episodes and rooms, and a plain loop beside."""
     how = f"times what one does, by {COPIES}; what else runs on the machine counts"
     loops, steps = ThreadPoolExecutor(COPIES), max(10, round(4 * seconds))
-    many = [MobiliaVectorEnv(8, n_threads=n, scene="arena", time_limit_s=1e6) for n in (1, COPIES)]
-    for rooms in many:
+    many = {
+        n: MobiliaVectorEnv(8, n_workers=n if n > 1 else 0, scene="arena", time_limit_s=1e6)
+        for n in (1, COPIES)
+    }
+    for rooms in many.values():
         rooms.reset(seed=SEED)
 
-    def stepped(threads: int) -> float:
-        rooms, still = many[threads - 1], np.zeros((8, 2), np.float32)
-        return wall(lambda: [rooms.step(still) for _ in range(threads * steps)])
+    def stepped(workers: int) -> float:
+        rooms, still = many[workers], np.zeros((8, 2), np.float32)
+        return wall(lambda: [rooms.step(still) for _ in range(workers * steps)])
 
     def looped(copies: int) -> float:
         return wall(lambda: list(loops.map(loop, [LOOP] * copies)))
@@ -192,9 +195,11 @@ def at_once(seconds: float) -> Iterator[Row]:
             jobs = [replace(EPISODE, seed=SEED + k) for k in range(copies)]
             return wall(lambda: list(workers.each(partial(record, parent=out), jobs, jobs=copies)))
 
-        for what, work in (("two threads, 8 rooms", stepped), ("two processes, episodes", made)):
+        for what, work in (("two workers, 8 rooms", stepped), ("two processes, episodes", made)):
             found = in_turn(work, looped, lambda each: COPIES * each(1) / each(COPIES))
             yield compared(f"{what}: a plain loop", found, 1.0, "×", how)
+    for rooms in many.values():
+        rooms.close()
 
 
 def wall(work: Callable[[], object]) -> float:

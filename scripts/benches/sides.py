@@ -13,6 +13,7 @@ import sys
 import time
 from collections.abc import Callable, Iterator
 from copy import copy
+from inspect import signature
 from pathlib import Path
 from typing import Any
 
@@ -21,6 +22,7 @@ import mujoco
 import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
+from sim.gym.vector import MobiliaVectorEnv
 from sim.gym.wrappers import goal_rooms
 from sim.sensors.lidar.models.lms221 import Lms221Config
 
@@ -30,6 +32,8 @@ LOW, HIGH = 1, 9  # of the sorted ratios: the median lies between these, 98.8 %,
 ROOM_ROWS = 8  # of steps and resets; those of learners are a table of their own
 LEARN = 512  # transitions between two updates of the network
 ROOM: dict[str, Any] = {"terminate_on_collision": True, "time_limit_s": 30.0}
+_WORKERS = "n_workers" in signature(MobiliaVectorEnv).parameters  # an older checkout has threads
+ALONE = {"n_workers": 0} if _WORKERS else {"n_threads": 1}
 Found = dict[str, float]  # us of processor time by row
 Work = Callable[[], Found]
 
@@ -47,7 +51,7 @@ def works() -> Iterator[Work]:
         yield physics(f"8 `mj_step`, {scene.lower()}", world.model, copy(world.data))
         yield resetting(f"reset, {scene.lower()}", env)
     for n, scans in ((1, "all"), (4, "last"), (16, "last")):
-        rooms = goal_rooms("mobilia/ArenaGoal-v2", n, n_threads=1, scans=scans, **ROOM)
+        rooms = goal_rooms("mobilia/ArenaGoal-v2", n, scans=scans, **ROOM, **ALONE)
         rooms.reset(seed=SEED)
         yield stepping(f"learner's step, rooms: {n}", rooms, (n, 2), 96 // n)
     for n in (1, 4, 16):
@@ -106,7 +110,7 @@ def learning(n: int) -> Work:
     from sim.gym.learning import learning_rooms
 
     torch.set_num_threads(1)
-    rooms, inside = learning_rooms("mobilia/ArenaGoal-v2", n, n_threads=1, **ROOM), 0.0
+    rooms, inside = learning_rooms("mobilia/ArenaGoal-v2", n, **ROOM, **ALONE), 0.0
     step = rooms.step
 
     def timed(action: Any) -> Any:

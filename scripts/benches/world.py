@@ -4,6 +4,7 @@
 Figures are medians of ``REPEATS`` repeats of processor time.
 """
 
+import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
@@ -15,6 +16,7 @@ import numpy as np
 
 import sim  # noqa: F401  (registers the environments)
 from sim.core.packed import packed
+from sim.gym.vector import MobiliaVectorEnv
 from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.windows import note
@@ -30,6 +32,7 @@ SEED = 100
 DYNAMISM = 0.5
 REPEATS = 7
 N_ENVS = 4
+SHORT_S = 2.0  # of an episode
 Row = dict[str, Any]
 
 
@@ -166,6 +169,44 @@ def environments(seconds: float) -> Iterator[Row]:
         wanted = "≤ 50" if scene == "Office" else ""
         how = f"{scene.lower()}, every effect, another seed each time"
         yield row("env reset", float(np.median(resets)) * 1e3, "ms", wanted, how)
+    for n in (2, N_ENVS):
+        for workers in (0, 2):
+            yield from short_episodes(n, workers, 2 * steps)
+
+
+def short_episodes(n: int, workers: int, steps: int) -> Iterator[Row]:
+    """Rooms whose episodes of 2 s end one after the other: what a reset does to the rest."""
+    rooms = MobiliaVectorEnv(n, n_workers=workers, scene="office", time_limit_s=SHORT_S)
+    rooms.reset(seed=SEED)
+    still, scans = np.zeros((n, 2), np.float32), round(37.5 * SHORT_S)
+    for k in range(scans):
+        if any(turns := np.arange(n) * scans // n == k):
+            rooms.reset(options={"reset_mask": turns})
+        rooms.step(still)
+    spent, started = np.zeros(steps), workers_s(rooms)
+    for k in range(steps):
+        begun = time.perf_counter()
+        rooms.step(still)
+        spent[k] = time.perf_counter() - begun
+    used = workers_s(rooms) - started
+    rooms.close()
+    what = f"env steps, {n} rooms, 2 s episodes, {workers or 'no'} workers"
+    how = "office, every effect; by the wall, so that what else runs counts"
+    yield row(what, n * steps / spent.sum(), "1/s", "", how)
+    yield row(f"{what}: a processor second", n * steps / used, "1/s", "", "office, all processes")
+    yield row(f"{what}: mean step", spent.mean() * 1e3, "ms", "", how)
+    yield row(f"{what}: worst step", spent.max() * 1e3, "ms", "", how)
+
+
+def workers_s(rooms: MobiliaVectorEnv) -> float:
+    """Processor time of this process and of those that step the rooms, s."""
+    there: dict[int, float] = dict(rooms.each(process_s))
+    return sum({**there, os.getpid(): time.process_time()}.values())
+
+
+def process_s(_: object) -> tuple[int, float]:
+    """Which process this is, and its processor time, s."""
+    return os.getpid(), time.process_time()
 
 
 def stepping(room: Any, steps: int, n: int) -> float:

@@ -5,12 +5,14 @@ rooms = learning_rooms("mobilia/ArenaGoal-v2", 8)
 PPO("MlpPolicy", rooms).learn(150_000)
 """
 
-from collections.abc import Sequence
+from collections.abc import Callable
+from operator import attrgetter, methodcaller
 from typing import Any
 
 import numpy as np
 from gymnasium.vector import AutoresetMode, VectorEnv
 
+from sim.gym.vector import MobiliaVectorEnv
 from sim.gym.wrappers import goal_rooms
 from slam.errors import InvalidValueError, MissingDependencyError
 
@@ -72,24 +74,23 @@ class Rooms(VecEnv):  # type: ignore[misc]
 
     def get_attr(self, attr_name: str, indices: Any = None) -> list[Any]:
         """Of the rooms."""
-        return [getattr(room, attr_name) for room in self._picked(indices)]
+        return self._each(attrgetter(attr_name), indices)
 
     def set_attr(self, attr_name: str, value: Any, indices: Any = None) -> None:
         """Of the rooms."""
-        for room in self._picked(indices):
-            setattr(room, attr_name, value)
+        self._each(methodcaller("__setattr__", attr_name, value), indices)
 
     def env_method(self, method_name: str, *args: Any, indices: Any = None, **named: Any) -> Any:
         """What that method of each room returns."""
-        return [getattr(room, method_name)(*args, **named) for room in self._picked(indices)]
+        return self._each(methodcaller(method_name, *args, **named), indices)
 
     def env_is_wrapped(self, wrapper_class: Any, indices: Any = None) -> list[bool]:
         """Never: the rooms are wrapped together."""
         return [False for _ in self._get_indices(indices)]
 
-    def _picked(self, indices: Any) -> Sequence[Any]:
-        rooms = self.rooms.unwrapped.envs  # type: ignore[attr-defined]
-        return [rooms[i] for i in self._get_indices(indices)]
+    def _each(self, work: Callable[[Any], Any], indices: Any) -> list[Any]:
+        rooms: MobiliaVectorEnv = self.rooms.unwrapped  # type: ignore[assignment]
+        return rooms.each(work, list(self._get_indices(indices)))
 
 
 def learning_rooms(id_: str, num_envs: int = 8, *, n_stack: int = 3, **settings: Any) -> Any:

@@ -1,36 +1,32 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Many rooms in one process: ``gymnasium.make_vec(id, num_envs=8)``, bit for bit the single ones.
+"""Many rooms at once: ``gymnasium.make_vec(id, num_envs=8)``, bit for bit the single ones.
 
 One physics model per room, each stepped in one compiled call a scan. MuJoCo's ``Batch`` steps no
 faster on one core (46 us a step of the office either way), and it wants models of one size, which
 two seeds need not have. What is saved here is what a single environment builds at each step and a
-policy for many does not read: frames and the info of each room. With ``n_threads`` the rooms step
-side by side; physics, crowd and scanner let go of the interpreter lock, and the results do not
-depend on it.
+policy for many does not read: frames and the info of each room. With ``n_workers`` processes step
+the rooms side by side; the results do not depend on it.
 """
 
-import math
 from collections.abc import Callable, Mapping, Sequence
-from concurrent.futures import ThreadPoolExecutor, wait
 from typing import Any
 
 import numpy as np
+from gymnasium import spaces
 from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
 from sim.core.checks import switch, whole
+from sim.gym.block import Block, Board
 from sim.gym.env import MobiliaEnv, ResetNeededError
 from sim.gym.observation import Observation
 from sim.gym.options import array_of, checked_seed, of_rooms
+from sim.gym.workers import Workers
 from slam.errors import InvalidValueError
 
 MOST_ENVS = 4096  # each holds a physics model of its own
-MOST_THREADS = 1024
-TOLD: dict[str, Any] = {  # shape and type of what the infos tell of a room
-    "pose": ((3,), np.float64), "goal": ((2,), np.float64), "goal_distance": ((), np.float64),
-    "hard_collision": ((), np.bool_), "is_success": ((), np.bool_),
-}  # fmt: skip
+MOST_WORKERS = 1024
 
 
 class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
@@ -55,6 +51,12 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     all with a mask of the same name and a leading "_", here always true. They are of the new
     episode where "same_step" began one; ``infos["final_info"]`` has those of the old one.
 
+    ### Workers
+    ``n_workers`` processes have the rooms in blocks; 0, the default: this one has them all. Arrays
+    are shared, a step sends some bytes. Where a room begins anew by itself, its worker builds the
+    room of the next episode meanwhile, so that a reset hardly holds the others up. With ``frames``
+    the frames of each step are sent.
+
     ``settings`` are those of ``MobiliaEnv``, ``pose_source`` by name only, so that each room has a
     SLAM of its own; rendering is left to the single environment.
     """
@@ -64,12 +66,12 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         num_envs: int = 1,
         *,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
-        n_threads: int = 1,
+        n_workers: int = 0,
         frames: bool = False,
         **settings: Any,
     ) -> None:
         whole("num_envs", num_envs, 1, MOST_ENVS)
-        whole("n_threads", n_threads, 1, MOST_THREADS)
+        whole("n_workers", n_workers, 0, MOST_WORKERS)
         switch("frames", frames)
         source = settings.get("pose_source")
         if num_envs > 1 and source is not None and not isinstance(source, str):
@@ -81,19 +83,36 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         self.mode = _mode(autoreset_mode)
         self._frames = frames
         self.metadata = {**MobiliaEnv.metadata, "autoreset_mode": self.mode}
-        self.envs = [MobiliaEnv(**settings) for _ in range(num_envs)]
-        self.single_observation_space = self.envs[0].observation_space
-        self.single_action_space = self.envs[0].action_space
-        self.observation_space = batch_space(self.single_observation_space, num_envs)
+        rooms = [MobiliaEnv(**settings) for _ in range(1 if n_workers else num_envs)]
+        space = rooms[0].observation_space
+        assert isinstance(space, spaces.Dict)
+        self.single_observation_space, self.single_action_space = space, rooms[0].action_space
+        self.observation_space = batch_space(space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
-        zero = self.single_observation_space.sample()
-        self._seen = {k: np.zeros((num_envs, *v.shape), v.dtype) for k, v in zero.items()}
-        self._told = {k: np.zeros((num_envs, *s), kind) for k, (s, kind) in TOLD.items()}
-        if frames:
-            self._told["frame"] = np.empty(num_envs, dtype=object)
-        self._ended: NDArray[np.bool_] = np.zeros(num_envs, dtype=np.bool_)
-        self._helpers = min(n_threads, num_envs) - 1
-        self._pool = ThreadPoolExecutor(self._helpers) if self._helpers else None
+        self._begun: NDArray[np.bool_] = np.zeros(num_envs, dtype=np.bool_)
+        self._shown: NDArray[np.object_] = np.empty((2, num_envs), dtype=object)  # frames, last
+        self._rooms: Block | Workers
+        if n_workers:
+            workers = min(n_workers, num_envs)
+            self._rooms = Workers(workers, space, num_envs, self.mode, settings, frames=frames)
+        else:
+            board = Board(space, num_envs)
+            self._rooms = Block(dict(enumerate(rooms)), board, self.mode, frames=frames)
+        self._board = self._rooms.board
+
+    def each(
+        self, work: Callable[[MobiliaEnv], Any], rooms: Sequence[int] | None = None
+    ) -> list[Any]:
+        """What ``work`` of each of these rooms (default all) returns.
+
+        With workers it must be something that can be sent, as ``operator.attrgetter`` and
+        ``methodcaller`` make it, and so must what it returns.
+        """
+        asked = list(range(self.num_envs) if rooms is None else rooms)
+        for i in asked:
+            whole("room", i, 0, self.num_envs - 1)
+        found = self._rooms.each(work, asked)
+        return [found[i] for i in asked]
 
     def reset(
         self,
@@ -113,25 +132,14 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
                 f"option reset_mask must be ({self.num_envs},) bool with one true, got {mask!r}"
             )
         seeds = self._seeds(seed)
-        self._each(lambda i: self._restart(i, seeds[i], own), np.flatnonzero(mask).tolist())
-        self._ended[mask] = False
-        return _copied(self._seen), self._infos()
+        chosen = {i: seeds[i] for i in np.flatnonzero(mask).tolist()}
+        self._show(self._rooms.reset(chosen, own))
+        self._begun |= mask
+        return _copied(self._board.seen), self._infos()
 
-    def _each(self, work: Callable[[int], None], rooms: Sequence[int]) -> None:
-        """``work`` of every room, on all threads: whichever is free takes the next."""
-        left = iter(rooms)  # one thread at a time has the interpreter's lock, and so its ``next``
-
-        def some() -> None:
-            for i in left:
-                work(i)
-
-        others = [self._pool.submit(some) for _ in range(self._helpers)] if self._pool else []
-        try:
-            some()
-        finally:
-            wait(others)
-        for other in others:
-            other.result()
+    def _show(self, frames: Mapping[int, tuple[Any, Any]]) -> None:
+        for i, both in frames.items():
+            self._shown[:, i] = both
 
     def _seeds(self, seed: Any) -> list[int | None]:
         """One for each room."""
@@ -141,28 +149,6 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             return [checked_seed(one) for one in seed]
         first = checked_seed(seed)
         return [None if first is None else first + i for i in range(self.num_envs)]
-
-    def _restart(self, i: int, seed: int | None, options: dict[str, Any] | None) -> None:
-        observation, _ = self.envs[i].reset(seed=seed, options=options)
-        for name, stacked in self._seen.items():
-            if observation[name].shape != stacked[i].shape:
-                raise InvalidValueError(
-                    f"observation '{name}' has shape {observation[name].shape}, the others "
-                    f"{stacked[i].shape}: set the laser when making the environments"
-                )
-        self._keep(i, observation)
-
-    def _keep(self, i: int, observation: Observation) -> None:
-        for name, stacked in self._seen.items():
-            stacked[i] = observation[name]
-        env, told = self.envs[i], self._told
-        told["pose"][i] = env.simulation.world.robot_pose()
-        told["goal"][i] = env.goal or math.nan
-        told["goal_distance"][i] = math.nan if env.goal is None else env.goal_distance
-        told["hard_collision"][i] = any(contact.hard for contact in env.contacts)
-        told["is_success"][i] = env.is_success
-        if self._frames:
-            told["frame"][i] = env.simulation.frame
 
     def step(
         self, actions: NDArray[np.float32]
@@ -174,58 +160,45 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         Actions as in the single environment: finite ones are clipped, anything else is refused with
         ``InvalidValueError`` before any room moves. ``ResetNeededError`` before the first reset.
         """
-        commands = np.clip(of_rooms(actions, self.num_envs), -1.0, 1.0).tolist()
-        for env in self.envs:
-            env.simulation  # noqa: B018  (raises where it was never reset)
-        if self.mode == AutoresetMode.DISABLED and self._ended.any():
-            raise ResetNeededError(f"reset first: {np.flatnonzero(self._ended)}")
-        rewards, ends = np.zeros(self.num_envs), np.zeros((2, self.num_envs), dtype=np.bool_)
-        last: dict[int, Any] = {}
+        board = self._board
+        commands = np.clip(of_rooms(actions, self.num_envs), -1.0, 1.0)
+        if not self._begun.all():
+            raise ResetNeededError("call reset() before using the environment")
+        if self.mode == AutoresetMode.DISABLED and board.ends.any():
+            raise ResetNeededError(f"reset first: {np.flatnonzero(board.ends.any(axis=0))}")
+        board.commands[...] = commands
+        self._show(self._rooms.step())
+        terminated, truncated = board.ends.copy()
+        infos = self._infos()
+        if self.mode == AutoresetMode.SAME_STEP and board.ends.any():
+            infos |= self._final(terminated | truncated)
+        return _copied(board.seen), board.rewards.copy(), terminated, truncated, infos
 
-        def one(i: int) -> None:
-            if self._ended[i]:
-                self._restart(i, None, None)
-                return
-            observation, rewards[i], ends[0, i], ends[1, i] = self.envs[i].act(*commands[i])
-            self._keep(i, observation)
-            if self.mode == AutoresetMode.SAME_STEP and ends[:, i].any():
-                seen = {name: np.array(rows[i]) for name, rows in self._seen.items()}
-                last[i] = seen, {name: rows[[i]] for name, rows in self._told.items()}
-                self._restart(i, None, None)
-
-        self._each(one, np.argsort(~self._ended, kind="stable").tolist())  # what takes long, first
-        self._ended = ends[0] | ends[1]
-        final = {}
-        if self.mode == AutoresetMode.SAME_STEP:
-            final = self._final(last) if last else {}
-            self._ended = np.zeros(self.num_envs, dtype=np.bool_)
-        return _copied(self._seen), rewards, ends[0], ends[1], self._infos() | final
-
-    def _final(self, last: dict[int, Any]) -> dict[str, Any]:
+    def _final(self, ended: NDArray[np.bool_]) -> dict[str, Any]:
         """The last observations and infos of the rooms that ended and began anew."""
-        seen, infos = np.full(self.num_envs, None, dtype=object), self._infos()
-        for i, (observation, told) in last.items():
-            seen[i] = observation
-            for name, value in told.items():
-                infos[name][[i]] = value
+        board, seen, infos = self._board, np.full(self.num_envs, None, dtype=object), self._infos()
+        for i in np.flatnonzero(ended).tolist():
+            seen[i] = {name: np.array(rows[i]) for name, rows in board.last_seen.items()}
+            for name, rows in board.last_told.items():
+                infos[name][i] = rows[i]
+            if self._frames:
+                infos["frame"][i] = self._shown[1, i]
         return {
-            "final_obs": seen, "_final_obs": self._ended,
-            "final_info": infos, "_final_info": self._ended,
+            "final_obs": seen, "_final_obs": ended, "final_info": infos, "_final_info": ended,
         }  # fmt: skip
 
     def _infos(self) -> dict[str, Any]:
-        there = {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in self._told}
-        return _copied(self._told) | there
+        told = _copied(self._board.told)
+        if self._frames:
+            told["frame"] = self._shown[0].copy()
+        return told | {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in told}
 
     def render(self) -> None:
         """None: pictures are left to the single environment."""
 
     def close_extras(self, **kwargs: Any) -> None:
         """Called by ``close``."""
-        if self._pool is not None:
-            self._pool.shutdown()
-        for env in self.envs:
-            env.close()
+        self._rooms.close()
 
 
 def _copied(rows: Mapping[str, NDArray[Any]]) -> dict[str, Any]:

@@ -108,10 +108,10 @@ def goal_rooms(
     """Rooms that a small network learns in fast, each seen as ``GoalVector(LidarMinPooling)``.
 
     settings  of ``sim.gym.vector.MobiliaVectorEnv``. Unless they say otherwise, a step takes one
-              scan (``scans="last"``), the rooms step on two threads, and whoever steps them resets
+              scan (``scans="last"``), two processes step the rooms, and whoever steps them resets
               those that have ended (``autoreset_mode="disabled"``).
     """
-    usual = {"autoreset_mode": "disabled", "n_threads": 2, "scans": "last"}
+    usual = {"autoreset_mode": "disabled", "n_workers": 2, "scans": "last"}
     rooms: Any = gymnasium.make_vec(
         id_, num_envs=num_envs, vectorization_mode="vector_entry_point", **{**usual, **settings}
     )

@@ -1,0 +1,129 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Workers: the same rooms, errors as in one process, and nothing left behind."""
+
+import signal
+import subprocess
+import sys
+import time
+from operator import attrgetter, methodcaller
+from pathlib import Path
+
+import gymnasium
+import numpy as np
+import pytest
+
+from sim.gym import env as environment
+from sim.gym.env import MobiliaEnv
+from sim.gym.vector import MobiliaVectorEnv
+from sim.gym.workers import RoomsEndedError
+from slam.errors import InvalidValueError, MobiliaError
+
+SHORT = {"scene": "arena", "time_limit_s": 0.15, "goal": "random"}
+STILL = np.zeros((2, 2))
+ORPHANED = """
+import numpy, os, sys
+from sim.gym.vector import MobiliaVectorEnv
+rooms = MobiliaVectorEnv(2, n_workers=2, scene="arena")
+rooms.reset(seed=1)
+print(*(process.pid for process, _ in rooms._rooms._workers), flush=True)
+sys.stdin.read()
+"""
+
+
+@pytest.fixture
+def rooms():
+    many = MobiliaVectorEnv(3, n_workers=2, autoreset_mode="same_step", frames=True, **SHORT)
+    yield many
+    many.close()
+
+
+def test_errors_and_objects_come_from_workers_as_from_here(rooms):
+    here = MobiliaVectorEnv(3, autoreset_mode="same_step", frames=True, **SHORT)
+    for options, words in ({"gaol": 1}, "unknown reset option 'gaol'"), ({"goal": (99, 0)}, "goal"):
+        for many in (rooms, here):
+            with pytest.raises(InvalidValueError, match=words):
+                many.reset(seed=1, options=options)
+    with pytest.raises(gymnasium.error.ResetNeeded):
+        rooms.step(np.zeros((3, 2)))
+    with pytest.raises(InvalidValueError, match="another process"):
+        rooms.reset(options={"laser": lambda: 1})
+    for step in range(6):
+        told = [m.step(np.full((3, 2), 0.2)) if step else m.reset(seed=4) for m in (rooms, here)]
+        infos = [each[-1] for each in told]
+        scans = [[frame.scan.ranges for frame in each["frame"]] for each in infos]
+        np.testing.assert_array_equal(*scans)
+        assert ("final_info" in infos[0]) == ("final_info" in infos[1]) == (step == 5)
+    last = [[frame.stamp_ns for frame in each["final_info"]["frame"]] for each in infos]
+    assert last[0] == last[1] != [frame.stamp_ns for frame in infos[0]["frame"]]
+    times = attrgetter("simulation.world.time_ns")
+    assert rooms.each(times) == here.each(times)
+    assert rooms.each(methodcaller("__getattribute__", "time_limit_s"), [2]) == [0.15]
+    with pytest.raises(AttributeError, match="nothing") as raised:
+        rooms.each(attrgetter("nothing"))
+    assert "Traceback" in raised.value.__notes__[0]
+    with pytest.raises(InvalidValueError, match="room"):
+        rooms.each(times, [3])
+    here.close()
+
+
+def test_an_answer_that_an_interrupt_left_behind_is_not_taken_for_the_next(rooms):
+    rooms.reset(seed=1)
+    worker = rooms._rooms._workers[0][1]
+    receive, worker.recv = worker.recv, lambda: signal.raise_signal(signal.SIGINT)
+    with pytest.raises(KeyboardInterrupt):
+        rooms.step(np.zeros((3, 2)))
+    worker.recv = receive
+    times = rooms.each(attrgetter("simulation.world.time_ns"))
+    assert len(set(times)) == 1
+
+
+def test_a_killed_worker_is_an_error_and_the_others_end():
+    many = MobiliaVectorEnv(2, n_workers=2, **SHORT)
+    many.reset(seed=1)
+    processes = [process for process, _ in many._rooms._workers]
+    processes[1].kill()
+    for _ in range(2):
+        with pytest.raises(RoomsEndedError, match=r"ended \(signal 9\)"):
+            many.step(STILL)
+    assert [process.returncode for process in processes] == [0, -signal.SIGKILL]
+    many.close()
+
+
+def test_closing_while_rooms_are_built_ahead_leaves_nothing():
+    many = MobiliaVectorEnv(8, n_workers=2, autoreset_mode="next_step", scene="office")
+    many.reset(seed=1)  # eight rooms are being built, which takes half a second
+    processes = [process for process, _ in many._rooms._workers]
+    many.close()
+    assert [process.returncode for process in processes] == [0, 0]
+    with pytest.raises(gymnasium.error.ClosedEnvironmentError):
+        many.reset()
+
+
+def test_workers_end_with_a_parent_that_is_killed():
+    words = [sys.executable, "-c", ORPHANED]
+    root = Path(environment.__file__).parents[2]
+    with subprocess.Popen(
+        words, cwd=root, text=True, stdin=subprocess.PIPE, stdout=subprocess.PIPE
+    ) as parent:
+        workers = [int(word) for word in parent.stdout.readline().split()]
+        assert len(workers) == 2
+        parent.kill()
+    deadline = time.monotonic() + 20.0
+    while any(map(runs, workers)):
+        assert time.monotonic() < deadline
+        time.sleep(0.05)
+
+
+def runs(pid: int) -> bool:
+    try:
+        return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
+    except OSError:
+        return False
+
+
+def test_what_cannot_be_sent_is_refused():
+    class Own(type(MobiliaEnv(**SHORT)._settings["laser"])):
+        pass
+
+    with pytest.raises(MobiliaError, match="another process"):
+        MobiliaVectorEnv(2, n_workers=2, scene="arena", laser=Own())
