@@ -8,6 +8,7 @@ policy for many does not read: frames and the info of each room. With ``n_worker
 the rooms side by side; the results do not depend on it.
 """
 
+import weakref
 from collections.abc import Callable, Mapping, Sequence
 from typing import Any
 
@@ -95,6 +96,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         if n_workers:
             workers = min(n_workers, num_envs)
             self._rooms = Workers(workers, space, num_envs, self.mode, settings, frames=frames)
+            weakref.finalize(self, self._rooms.close)  # where nobody closes it
         else:
             board = Board(space, num_envs)
             self._rooms = Block(dict(enumerate(rooms)), board, self.mode, frames=frames)
