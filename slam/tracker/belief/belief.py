@@ -287,8 +287,8 @@ class Belief:
             if goes_on:
                 vote = observations.mean_vote
                 self._agreement.take(prediction, found.T_map_robot, vote, in_doubt=True)
-            hidden = episode.evidence.latest_m < self._config.confirmed_m  # in the scan before
-            dragged = goes_on and hidden and self._agreement.dragged() > 0.5
+            often = prediction.elapsed <= PAUSE_S  # else no match follows what moves
+            dragged = goes_on and often and self._is_dragged(cell_map, observations, found)
             episode.matched = goes_on and not dragged
             match = found if episode.matched else replace(match, matched=found.matched)
             if dragged:

@@ -46,7 +46,9 @@ class Agreement:
     before it saw, u the share of its returns without weight. With H = holds diag(1, 1, lever^2),
     ``P = min(u / few, 1) H (H + G)^-1`` is the share that is left to movers. A window of w s
     forgets with exp(-t / w): S is the sum of P c, V that of odometry's covariances. With R, what a
-    match itself may be off, S' (V + R)^-1 S / 3 is at most about 1 where all is well.
+    match itself may be off, S' (V + R)^-1 S / 3 is at most about 1 where all is well. Where it is
+    not, the matches followed movers, and little old surface among them held nothing: the pose is
+    put back by F, the sum of c.
 
     ratio  that
     """
@@ -59,7 +61,7 @@ class Agreement:
 
     def forget(self) -> None:
         """The robot was set elsewhere: what was summed says nothing of it."""
-        self._sum, self._variance = [0.0] * 3, [0.0] * 6
+        self._sum, self._whole, self._variance = [0.0] * 3, [0.0] * 3, [0.0] * 6
         self._held, self._looks = [0.0] * 6, 0.0
         self.ratio = 0.0
         self._elapsed_s = 0.0
@@ -67,8 +69,10 @@ class Agreement:
 
     def turned(self, by: float) -> None:
         """The map frame was turned by ``by`` rad, and the robot with it."""
-        c, s, (x, y, t) = math.cos(by), math.sin(by), self._sum
-        self._sum = [c * x - s * y, s * x + c * y, t]
+        c, s = math.cos(by), math.sin(by)
+        self._sum, self._whole = (
+            [c * x - s * y, s * x + c * y, t] for x, y, t in (self._sum, self._whole)
+        )
         self._variance, self._held = _turned(self._variance, by), _turned(self._held, by)
 
     def hold(self, old: Float, elapsed_s: float) -> None:
@@ -100,11 +104,13 @@ class Agreement:
 
         ``in_doubt``: to the local copy, while it is not known whether the map is right there.
         """
-        pulled = self._left_to_movers(vote, prediction.off(T_map_robot), in_doubt)
+        off = prediction.off(T_map_robot)
+        pulled = self._left_to_movers(vote, off, in_doubt)
         (xx, xy, xt), (_, yy, yt), (_, _, tt) = prediction.covariance.tolist()
         self._elapsed_s = prediction.elapsed
         keep = math.exp(-prediction.elapsed / self._config.window_s)
         S = self._sum = [keep * a + b for a, b in zip(self._sum, pulled, strict=True)]
+        self._whole = [keep * a + b for a, b in zip(self._whole, off.tolist(), strict=True)]
         more = (xx, xy, xt, yy, yt, tt)
         V = [keep * keep * a + b for a, b in zip(self._variance, more, strict=True)]
         self._variance = V
@@ -124,20 +130,20 @@ class Agreement:
         return 1.0 / (1.0 + math.exp(-nats))
 
     def put_back(self, T_map_robot: Float) -> Float:
-        """(3,) the pose without what movers may have made: where odometry leads."""
-        pose: Float = T_map_robot - np.array(self._sum)
+        """(3,) the pose without the corrections of the window: where odometry leads."""
+        pose: Float = T_map_robot - np.array(self._whole)
         pose[2] = se2.wrap(float(pose[2]))
         return pose
 
     def undragged(self, T_map_robot: Float) -> Float:
         """(3,) the pose put back, from which the sums begin anew.
 
-        With the rest of the probability the matches were right: the pose is off by S now, and
+        With the rest of the probability the matches were right: the pose is off by F now, and
         ``left_behind`` says so.
         """
         pose = self.put_back(T_map_robot)
         dragged = self.dragged()
-        put_back = dragged * (1.0 - dragged) * self.covariance()
+        put_back = dragged * (1.0 - dragged) * np.multiply.outer(self._whole, self._whole)
         held, looks = self._held, self._looks
         self.forget()
         self._put_back, self._held, self._looks = put_back, held, looks

@@ -40,7 +40,7 @@ def fed(
 
 def summed(agreement: Agreement) -> Array:
     """(3,) what movers may have made of the corrections."""
-    return -agreement.put_back(np.zeros(3))
+    return np.array(agreement._sum)
 
 
 def test_chance_corrections_agree() -> None:
@@ -155,6 +155,23 @@ def test_a_pose_that_was_put_back_may_have_been_right() -> None:
     assert agreement.left_behind() == pytest.approx(p * (1.0 - p) * spread)
     assert not agreement.left_behind().any()
     assert agreement.ratio == 0.0
+
+
+def test_a_pose_is_put_back_to_where_odometry_leads_however_little_old_surface_held() -> None:
+    """Else a robot that a board takes along is put back by half of each correction, and follows."""
+    little, turn = np.array([2.0, 0.5, 0.0, 1.0, 0.0, 3.0]), 0.8
+    rows, keep = np.tile([0.05, -0.02, 0.01], (20, 1)), math.exp(-STEP_S / NUMBERS.window_s)
+    agreement, turned = fed(rows, little), fed(rows, little)
+    whole = rows[0] * (1.0 - keep**20) / (1.0 - keep)
+    assert abs(summed(agreement)[0]) < 0.5 * whole[0]
+    pose = np.array([1.0, 2.0, 0.5])
+    assert agreement.undragged(pose) == pytest.approx(pose - whole, rel=1e-9)
+    assert agreement.undragged(pose) == pytest.approx(pose)  # all is taken back once
+    turned.turned(turn)
+    c, s = math.cos(turn), math.sin(turn)
+    x, y, t = whole.tolist()
+    expected = [-(c * x - s * y), -(s * x + c * y), -t]
+    assert turned.undragged(np.zeros(3)) == pytest.approx(expected)
 
 
 def test_a_robot_that_was_set_elsewhere_starts_anew() -> None:
