@@ -19,6 +19,7 @@ from slam.frames import Float
 
 _SYMMETRIC: Any = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 LEAST = 1e-9  # added to the diagonal
+LEAK = 1e-6  # to that of the Laplacian, so that poses which nothing ties to pose 0 have a factor
 Ints = NDArray[np.int64]
 
 
@@ -33,8 +34,9 @@ class Pattern:
     def __init__(self, n: int, ends: Ints) -> None:
         both = np.append(ends, ends[:, ::-1], axis=0).T
         ones = sparse.csc_matrix((np.ones(both.shape[1]), (both[0], both[1])), shape=(n, n))
-        ones = ones[1:, 1:] + both.shape[1] * sparse.eye(n - 1, format="csc")  # has a factor
-        solved = splu(ones, permc_spec="MMD_AT_PLUS_A", **_SYMMETRIC)
+        # the graph's Laplacian: no block of its factor is 0 by chance, or small for a long chain
+        graph = sparse.diags(np.bincount(both[0], minlength=n) + LEAK, format="csc") - ones
+        solved = splu(graph[1:, 1:], permc_spec="MMD_AT_PLUS_A", **_SYMMETRIC)
         self.place = np.append(-1, solved.perm_c).astype(np.int64)
         lower = solved.L
         lower.sort_indices()
