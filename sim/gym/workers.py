@@ -116,7 +116,7 @@ class Workers:
         if self._ended:
             raise RoomsEndedError(self._ended)
         self._asked += 1
-        told = _packed(self._asked, name, words)
+        told = _packed(self._asked, name, _packed(*words))
         for _, worker in self._workers:
             with suppress(OSError):
                 worker.send_bytes(told)
@@ -161,6 +161,17 @@ def _packed(*words: Any) -> bytes:
         ) from error
 
 
+def _unpacked(told: bytes) -> Any:
+    """The words; a worker has the modules of the script that started it, and not the script."""
+    try:
+        return pickle.loads(told)
+    except Exception as error:
+        raise InvalidValueError(
+            f"with n_workers this is for what another process can be sent, by a module and not by "
+            f"the script that runs: {error}"
+        ) from error
+
+
 def _folder() -> str | None:
     """Where files stay in memory, if there is such a place."""
     return "/dev/shm" if os.access("/dev/shm", os.W_OK) else None
@@ -182,8 +193,9 @@ def serve(parent: Connection, memory: int, k: int, n_workers: int) -> None:
     threads = ThreadPoolExecutor(1)
     with suppress(EOFError, OSError):
         while True:
-            number, name, words = parent.recv()
+            number, name, told = parent.recv()
             try:
+                words = _unpacked(told)
                 if name == "begin":
                     block, answer = _block(memory, k, n_workers, threads, *words), None
                 else:
@@ -199,7 +211,7 @@ def _block(
     memory: int, k: int, n_workers: int, threads: Executor, modules: Sequence[str], told: bytes
 ) -> Block:
     load(modules)  # before what is told, which may be of them
-    space, n, mode, settings, frames = pickle.loads(told)
+    space, n, mode, settings, frames = _unpacked(told)
     board = Board(space, n, mmap.mmap(memory, Board.size(space, n)))
     mine = range(k * n // n_workers, (k + 1) * n // n_workers)
     rooms = {i: MobiliaEnv(**settings) for i in mine}

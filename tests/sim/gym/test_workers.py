@@ -130,3 +130,17 @@ def test_what_cannot_be_sent_is_refused():
 
     with pytest.raises(MobiliaError, match="another process"):
         MobiliaVectorEnv(2, n_workers=2, scene="arena", laser=Own())
+
+
+def test_what_a_worker_cannot_load_is_refused_and_the_rooms_go_on(rooms, monkeypatch):
+    """As a function of the script that runs, which its workers do not have."""
+    rooms.reset(seed=1)
+    monkeypatch.setattr(sys.modules["__main__"], "own", own, raising=False)
+    monkeypatch.setattr(own, "__module__", "__main__")
+    with pytest.raises(InvalidValueError, match=r"another process.*'own'"):
+        rooms.each(own)
+    assert rooms.step(np.zeros((3, 2)))[1].shape == (3,)
+
+
+def own(room: MobiliaEnv) -> float:
+    return room.time_limit_s
