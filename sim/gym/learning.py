@@ -89,8 +89,10 @@ class Rooms(VecEnv):  # type: ignore[misc]
         return [False for _ in self._get_indices(indices)]
 
     def _each(self, work: Callable[[Any], Any], indices: Any) -> list[Any]:
-        rooms: MobiliaVectorEnv = self.rooms.unwrapped  # type: ignore[assignment]
-        return rooms.each(work, list(self._get_indices(indices)))
+        rooms, asked = self.rooms.unwrapped, list(self._get_indices(indices))
+        if isinstance(rooms, MobiliaVectorEnv):
+            return rooms.each(work, asked)
+        return [work(rooms.envs[i]) for i in asked]  # type: ignore[attr-defined]
 
 
 def learning_rooms(id_: str, num_envs: int = 8, *, n_stack: int = 3, **settings: Any) -> Any:
