@@ -157,10 +157,12 @@ def write_from(
     commit  of the code that made their rows
     only    SLAMs whose rows are taken; None: all
 
-    Raises ``InvalidValueError`` for two folders whose recordings differ, and what is no commit.
+    Raises ``InvalidValueError`` for two folders whose recordings differ, for what is no commit, and
+    for SLAMs of ``only`` that have no row in the folders.
     """
     if not _COMMIT.holds(commit):
         raise InvalidValueError(f"--commit must be {_COMMIT.wanted}, got {commit!r:.80}")
+    made_here: set[str] = set()
     before: dict[str, Any] = load(path, WHAT, SCHEMA) if path.exists() else {}
     runs, hashes = dict[str, Row](before.get("runs", {})), dict[str, str](before.get("tracks", {}))
     for folder, track in product(folders, TRACKS.values()):
@@ -179,6 +181,11 @@ def write_from(
             if there["recording"] != scans:
                 raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
             there["slams"] |= own
+            made_here |= set(own)
+    if missing := sorted(set(only or ()) - made_here):
+        raise InvalidValueError(
+            f"--only {' '.join(missing)}: no row in {', '.join(map(str, folders))}"
+        )
     made: Row = {"versions": versions(), "machine": machine()}
     earlier = before.get("made_with", made)
     made["versions"] = {k: _each(earlier["versions"].get(k, v), v) for k, v in versions().items()}

@@ -23,7 +23,7 @@ from sim.gym.block import Block, Board
 from sim.gym.env import MobiliaEnv, ResetNeededError
 from sim.gym.observation import Observation
 from sim.gym.options import array_of, checked_seed, of_rooms
-from sim.gym.workers import Workers
+from sim.gym.workers import RoomsEndedError, Workers
 from slam.errors import InvalidValueError
 
 MOST_ENVS = 4096  # each holds a physics model of its own
@@ -74,6 +74,8 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         whole("num_envs", num_envs, 1, MOST_ENVS)
         whole("n_workers", n_workers, 0, MOST_WORKERS)
         switch("frames", frames)
+        if "n_threads" in settings:
+            raise InvalidValueError("n_threads is gone: n_workers=2 steps the rooms in 2 processes")
         source = settings.get("pose_source")
         if num_envs > 1 and source is not None and not isinstance(source, str):
             raise InvalidValueError(
@@ -127,6 +129,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             raise InvalidValueError(
                 f"reset options must be a dictionary or None, got {options!r:.200}"
             )
+        self._refuse_closed()
         own = dict(options or {})
         mask = array_of(own.pop("reset_mask", np.ones(self.num_envs, dtype=np.bool_)))
         if mask.dtype != np.bool_ or mask.shape != (self.num_envs,) or not mask.any():
@@ -138,6 +141,10 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         self._show(self._rooms.reset(chosen, own))
         self._begun |= mask
         return _copied(self._board.seen), self._infos()
+
+    def _refuse_closed(self) -> None:
+        if self.closed:
+            raise RoomsEndedError("the environment is closed")
 
     def _show(self, frames: Mapping[int, tuple[Any, Any]]) -> None:
         for i, both in frames.items():
@@ -164,6 +171,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         """
         board = self._board
         commands = np.clip(of_rooms(actions, self.num_envs), -1.0, 1.0)
+        self._refuse_closed()
         if not self._begun.all():
             raise ResetNeededError("call reset() before using the environment")
         if self.mode == AutoresetMode.DISABLED and board.ends.any():

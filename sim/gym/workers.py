@@ -12,6 +12,7 @@ import pickle
 import subprocess
 import sys
 import tempfile
+import time
 import traceback
 from collections.abc import Callable, Mapping, Sequence
 from concurrent.futures import Executor, ThreadPoolExecutor
@@ -38,7 +39,8 @@ from sim.gym.workers import serve
 serve(parent, *map(int, sys.argv[2:]))
 """
 _SWITCH_S = 0.0005  # for which building ahead may hold up a step, where nothing else lets go
-_LEAVE_S = 10.0  # for a worker that is asked to end: it may be building a room
+_LEAVE_S = 10.0  # for workers that are asked to end: they may be building a room
+_LEAVE = pickle.dumps((0, "leave", b""))
 
 
 class RoomsEndedError(MobiliaError, gymnasium.error.ClosedEnvironmentError):
@@ -70,7 +72,7 @@ class Workers:
         size = Board.size(space, n)
         try:
             with tempfile.TemporaryFile(dir=_folder()) as file:
-                os.ftruncate(file.fileno(), size)
+                _reserve(file.fileno(), size)
                 self.board = Board(space, n, mmap.mmap(file.fileno(), size))
                 for k in range(n_workers):
                     self._start(file.fileno(), k, n_workers)
@@ -142,14 +144,27 @@ class Workers:
         """End all; a room that is just being built is waited for."""
         self._ended = self._ended or why
         for _, worker in self._workers:
+            with suppress(OSError):
+                worker.send_bytes(_LEAVE)  # where a fork of ours holds the pipe open, too
             worker.close()
+        end = time.monotonic() + _LEAVE_S
         for process, _ in self._workers:
             try:
-                process.wait(_LEAVE_S)
+                process.wait(max(end - time.monotonic(), 0.0))
             except subprocess.TimeoutExpired:
                 process.kill()
                 process.wait()
         self._workers = []
+
+
+def _reserve(file: int, size: int) -> None:
+    """Memory that is promised and not there would end the process that writes to it."""
+    try:
+        os.ftruncate(file, size)
+        if hasattr(os, "posix_fallocate"):
+            os.posix_fallocate(file, 0, size)
+    except OSError as error:
+        raise InvalidValueError(f"n_workers needs {size} bytes of shared memory: {error}") from None
 
 
 def _packed(*words: Any) -> bytes:
@@ -194,6 +209,8 @@ def serve(parent: Connection, memory: int, k: int, n_workers: int) -> None:
     with suppress(EOFError, OSError):
         while True:
             number, name, told = parent.recv()
+            if name == "leave":
+                break
             try:
                 words = _unpacked(told)
                 if name == "begin":

@@ -192,6 +192,8 @@ def test_rows_that_are_made_again_name_their_commit_and_no_other_row_does(
     assert made.commits("mine", [track]) == [commit]
     assert made.commits("shunting", [track])[1:] == [commit]
     assert commit[:8] in shipped(made)
+    with pytest.raises(InvalidValueError, match="--only shuntin: no row"):
+        published.write_from([tmp_path], path, commit, only=["shunting", "shuntin"])
     with pytest.raises(InvalidValueError, match="commit must be the hash"):
         published.write_from([], path, "0c42a0f (oracle(map): 02c3eff)")
 

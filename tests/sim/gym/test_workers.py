@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Workers: the same rooms, errors as in one process, and nothing left behind."""
 
+import os
 import signal
 import subprocess
 import sys
@@ -64,6 +65,34 @@ def test_errors_and_objects_come_from_workers_as_from_here(rooms):
     with pytest.raises(InvalidValueError, match="room"):
         rooms.each(times, [3])
     here.close()
+
+
+def test_rooms_that_are_closed_say_so_with_workers_and_without():
+    for workers in (0, 2):
+        many = MobiliaVectorEnv(2, n_workers=workers, scene="arena")
+        many.reset(seed=1)
+        many.close()
+        for asked in (lambda many=many: many.reset(seed=1), lambda many=many: many.step(STILL)):
+            with pytest.raises(RoomsEndedError, match="closed"):
+                asked()
+    with pytest.raises(InvalidValueError, match="n_workers"):
+        MobiliaVectorEnv(2, n_threads=2, scene="arena")
+
+
+@pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
+def test_a_fork_that_holds_the_pipes_does_not_keep_workers():
+    many = MobiliaVectorEnv(2, n_workers=2, scene="arena")
+    child = os.fork()
+    if child == 0:
+        time.sleep(60.0)
+        os._exit(0)
+    try:
+        workers = [process for process, _ in many._rooms._workers]
+        many.close()
+        assert [process.returncode for process in workers] == [0, 0]  # none was killed
+    finally:
+        os.kill(child, signal.SIGKILL)
+        os.waitpid(child, 0)
 
 
 def test_an_answer_that_an_interrupt_left_behind_is_not_taken_for_the_next(rooms):
