@@ -113,7 +113,7 @@ def variances(events: Sequence[Event], pull: Pull) -> Float:
             out += latest
             keep = math.exp(-told[0].elapsed / NUMBERS.window_s)  # type: ignore[attr-defined]
             error = keep * error + erred
-            said = -agreement.put_back(np.zeros(3))
+            said = agreement.by_movers
             both = (error, said, error - said)
             latest = np.array([float(v[0] ** 2 + v[1] ** 2) for v in both]) * (1.0 - keep * keep)
     return out + latest

@@ -35,11 +35,13 @@ IMPORTERS = {
     "scripts/experiments/study.py": "runs of ours",
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
+    "sim/gym/workers.py": ["pickle"],  # settings and functions of who makes the rooms
     "slam/guests/guard.py": ["marshal"],
     "slam/guests/wire.py": ["marshal"],
 }
 STARTERS = {
     "slam/guests/wire.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
+    "sim/gym/workers.py": "our own Python, which steps some of the rooms",
     "sim/view/gl.py": "our own Python, without the working folder",
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/benches/shares.py": "perf and nm, on ourselves",

@@ -129,6 +129,11 @@ class Agreement:
         nats = min(1.5 * (self.ratio - self._config.disagreed), 50.0)  # of 3 numbers: 3 / 2
         return 1.0 / (1.0 + math.exp(-nats))
 
+    @property
+    def by_movers(self) -> Float:
+        """(3,) S: what movers may have made of the corrections of the window."""
+        return np.array(self._sum)
+
     def put_back(self, T_map_robot: Float) -> Float:
         """(3,) the pose without the corrections of the window: where odometry leads."""
         pose: Float = T_map_robot - np.array(self._whole)

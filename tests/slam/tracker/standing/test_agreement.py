@@ -38,11 +38,6 @@ def fed(
     return agreement
 
 
-def summed(agreement: Agreement) -> Array:
-    """(3,) what movers may have made of the corrections."""
-    return np.array(agreement._sum)
-
-
 def test_chance_corrections_agree() -> None:
     rng = np.random.default_rng(5)
     ratios = [fed(rng.normal(0.0, SIGMA, (100, 3))).ratio for _ in range(40)]
@@ -57,14 +52,14 @@ def test_small_corrections_to_one_side_add_up() -> None:
     S = 0.6 * SIGMA[0] * (1.0 - keep**n) / (1.0 - keep)
     V = SIGMA[0] ** 2 * (1.0 - keep ** (2 * n)) / (1.0 - keep**2)
     assert agreement.ratio == pytest.approx(S * S / (V + NUMBERS.match_m**2) / 3.0, rel=1e-9)
-    assert summed(agreement) == pytest.approx([S, 0.0, 0.0], rel=1e-9)
+    assert agreement.by_movers == pytest.approx([S, 0.0, 0.0], rel=1e-9)
 
 
 def test_what_old_surface_shows_is_odometrys_error() -> None:
     """However large: a slip in a known room is no sign of movers. Without one it is."""
     rows = np.tile(20.0 * SIGMA, (10, 1))
     assert fed(rows, A_ROOM).ratio < NUMBERS.disagreed < 100.0 < fed(rows).ratio
-    left = summed(fed(rows, A_ROOM)) / summed(fed(rows))
+    left = fed(rows, A_ROOM).by_movers / fed(rows).by_movers
     turn = PULL.holds * PULL.lever_m**2
     expected = [PULL.holds / (PULL.holds + 40.0)] * 2 + [turn / (turn + 200.0)]
     assert left == pytest.approx(expected, rel=1e-9)
@@ -73,10 +68,10 @@ def test_what_old_surface_shows_is_odometrys_error() -> None:
 def test_where_all_returns_have_weight_nobody_moves() -> None:
     """A building that is seen the first time has no old surface, and no correction is a mover's."""
     rows = np.tile(20.0 * SIGMA, (10, 1))
-    assert not summed(fed(rows, vote=1.0)).any()
-    some = summed(fed(rows, vote=1.0 - 0.4 * PULL.few)) / summed(fed(rows))
+    assert not fed(rows, vote=1.0).by_movers.any()
+    some = fed(rows, vote=1.0 - 0.4 * PULL.few).by_movers / fed(rows).by_movers
     assert some == pytest.approx(0.4)
-    assert summed(fed(rows, vote=1.0 - PULL.few)) == pytest.approx(summed(fed(rows)))
+    assert fed(rows, vote=1.0 - PULL.few).by_movers == pytest.approx(fed(rows).by_movers)
 
 
 def test_a_corridor_holds_the_robot_across_and_not_along() -> None:
@@ -87,10 +82,10 @@ def test_a_corridor_holds_the_robot_across_and_not_along() -> None:
         walls = 40.0 * np.array([s * s, -s * c, 0.0, c * c, 0.0, 1.0])
         along = np.tile([0.01 * c, 0.01 * s, 0.0], (10, 1))
         across = np.tile([-0.01 * s, 0.01 * c, 0.0], (10, 1))
-        whole = summed(fed(rows))[0]
-        assert summed(fed(along, walls)) == pytest.approx([c * whole, s * whole, 0.0], abs=1e-12)
+        whole = fed(rows).by_movers[0]
+        assert fed(along, walls).by_movers == pytest.approx([c * whole, s * whole, 0.0], abs=1e-12)
         held = PULL.holds / (PULL.holds + 40.0) * whole
-        assert summed(fed(across, walls)) == pytest.approx([-s * held, c * held, 0.0], abs=1e-12)
+        assert fed(across, walls).by_movers == pytest.approx([-s * held, c * held, 0.0], abs=1e-12)
 
 
 def test_surface_that_was_in_view_holds_for_half_a_second() -> None:
@@ -99,9 +94,9 @@ def test_surface_that_was_in_view_holds_for_half_a_second() -> None:
     shares = []
     for _ in range(10):
         agreement.hold(NOTHING, STEP_S)
-        before = summed(agreement)[0] * math.exp(-STEP_S / NUMBERS.window_s)
+        before = agreement.by_movers[0] * math.exp(-STEP_S / NUMBERS.window_s)
         agreement.take(by_odometry(), np.array([0.001, 0.0, 0.0]), 0.0)
-        shares.append((summed(agreement)[0] - before) / 0.001)
+        shares.append((agreement.by_movers[0] - before) / 0.001)
     assert shares[0] < 0.05
     assert np.all(np.diff(shares) > 0.0)
     assert shares[-1] > 0.5
@@ -110,7 +105,7 @@ def test_surface_that_was_in_view_holds_for_half_a_second() -> None:
 def test_while_the_pose_is_in_doubt_the_map_holds_no_position_but_a_heading() -> None:
     agreement = fed(np.zeros((20, 3)), A_ROOM)
     agreement.take(by_odometry(), np.array([0.02, -0.01, 0.03]), 0.0, in_doubt=True)
-    x, y, turn = summed(agreement)
+    x, y, turn = agreement.by_movers
     assert (x, y) == pytest.approx((0.02, -0.01))
     assert turn < 0.01 * 0.03
 
@@ -131,7 +126,7 @@ def test_half_of_the_matches_are_blamed_at_the_ratio_that_says_nothing() -> None
 
 def test_the_spread_is_the_sum_squared() -> None:
     agreement = fed(np.tile([SIGMA[0], -SIGMA[1], 0.0], (100, 1)))
-    S = summed(agreement)
+    S = agreement.by_movers
     assert agreement.covariance() == pytest.approx(np.outer(S, S), rel=1e-9)
     assert S[1] == pytest.approx(-S[0])
 
@@ -163,7 +158,7 @@ def test_a_pose_is_put_back_to_where_odometry_leads_however_little_old_surface_h
     rows, keep = np.tile([0.05, -0.02, 0.01], (20, 1)), math.exp(-STEP_S / NUMBERS.window_s)
     agreement, turned = fed(rows, little), fed(rows, little)
     whole = rows[0] * (1.0 - keep**20) / (1.0 - keep)
-    assert abs(summed(agreement)[0]) < 0.5 * whole[0]
+    assert abs(agreement.by_movers[0]) < 0.5 * whole[0]
     pose = np.array([1.0, 2.0, 0.5])
     assert agreement.undragged(pose) == pytest.approx(pose - whole, rel=1e-9)
     assert agreement.undragged(pose) == pytest.approx(pose)  # all is taken back once
@@ -191,6 +186,6 @@ def test_in_a_map_that_was_turned_the_old_surface_holds_as_before() -> None:
     turned.turned(turn)
     asked.take(by_odometry(), np.array([0.02, 0.05, 0.0]), 0.0)
     turned.take(by_odometry(), np.array([c * 0.02 - s * 0.05, s * 0.02 + c * 0.05, 0.0]), 0.0)
-    x, y, t = summed(asked)
-    assert summed(turned) == pytest.approx([c * x - s * y, s * x + c * y, t])
+    x, y, t = asked.by_movers
+    assert turned.by_movers == pytest.approx([c * x - s * y, s * x + c * y, t])
     assert turned.ratio == pytest.approx(asked.ratio)
