@@ -18,8 +18,8 @@ from slam._jit import inner, uncounted
 from slam.frames import Float
 
 _SYMMETRIC: Any = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
-LEAST = 1e-9  # added to the diagonal
-LEAK = 1e-6  # to that of the Laplacian, so that poses which nothing ties to pose 0 have a factor
+LEAST = 1e-9  # 1/m^2, 1/rad^2: added to the diagonal, for poses that nothing holds; set by hand
+LEAK = 1e-6  # edges: the same for the Laplacian, whose pattern alone is used; set by hand
 Ints = NDArray[np.int64]
 
 

@@ -158,10 +158,7 @@ class Agreement:
         """(3, 3) of the pose by what movers may have made of its corrections: S S'."""
         if self._config.disagreed == 0.0:
             return np.zeros((3, 3))
-        x, y, turn = self._sum
-        return np.array(
-            [[x * x, x * y, x * turn], [x * y, y * y, y * turn], [x * turn, y * turn, turn**2]]
-        )
+        return np.multiply.outer(self._sum, self._sum)
 
     def left_behind(self) -> Float:
         """(3, 3) the part of that which the window is about to forget: the map's from now on.
