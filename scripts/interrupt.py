@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Ctrl-C and kill: unwind everything, so that what is half-written is removed on the way."""
 
+import atexit
 import signal
 from types import FrameType
+from typing import NoReturn
 
 LLVM = ("llvmlite.binding", "numba.core.codegen", "numba.core.serialize", "slam._numba")  # modules
 _RETRY_S = 0.05  # s, until a signal that came while LLVM was at work is raised
@@ -20,6 +22,12 @@ def _interrupt(number: int, frame: FrameType | None) -> None:
     if _within_llvm(frame) and not again:
         signal.setitimer(signal.ITIMER_REAL, _RETRY_S)
         return
+    _raise()
+
+
+def _raise() -> NoReturn:
+    """Once: the alarm of a signal that waits would raise again, in the middle of cleaning up."""
+    signal.setitimer(signal.ITIMER_REAL, 0.0)
     raise InterruptedBySignal
 
 
@@ -42,6 +50,8 @@ def install() -> None:
     for number in (signal.SIGINT, signal.SIGTERM):
         signal.signal(number, _interrupt)
     signal.signal(signal.SIGALRM, _interrupt)
+    # Python gives handlers up as it ends, but for what is ignored: an alarm would then kill it
+    atexit.register(signal.signal, signal.SIGALRM, signal.SIG_IGN)
     if signal.getsignal(signal.SIGHUP) != signal.SIG_IGN:
         signal.signal(signal.SIGHUP, _interrupt)
 
@@ -49,4 +59,4 @@ def install() -> None:
 def check() -> None:
     """Raise it again: an exception that hits a finaliser is lost."""
     if _asked:
-        raise InterruptedBySignal
+        _raise()

@@ -52,6 +52,47 @@ def test_a_signal_waits_for_llvm():
     assert said_after(signal.SIGTERM, words) == "compiled\nunwound"
 
 
+WAITING = """
+import signal, time
+from scripts import interrupt
+
+interrupt.install()
+exec("signal.raise_signal(signal.SIGTERM)", {"__name__": "llvmlite.binding.ffi", "signal": signal})
+try:
+    if SEEN_AT_ONCE:
+        interrupt.check()
+    time.sleep(60)
+except interrupt.InterruptedBySignal:
+    print("unwound", signal.getitimer(signal.ITIMER_REAL))
+"""
+
+
+@pytest.mark.parametrize("seen_at_once", [True, False])
+def test_a_signal_that_waited_is_raised_once(seen_at_once: bool):
+    words = [sys.executable, "-c", WAITING.replace("SEEN_AT_ONCE", str(seen_at_once))]
+    done = subprocess.run(words, cwd=REPO, capture_output=True, text=True, timeout=60)
+    assert (done.stdout, done.returncode) == ("unwound (0.0, 0.0)\n", 0), done.stderr
+
+
+ENDING = """
+import builtins, signal
+from scripts import interrupt
+
+class Last:
+    def __del__(self, kill=signal.raise_signal, number=signal.SIGALRM):
+        kill(number)  # after Python has given up its handlers
+
+interrupt.install()
+builtins.last = Last()
+print("ended", flush=True)
+"""
+
+
+def test_an_alarm_does_not_kill_a_command_that_ends():
+    done = subprocess.run([sys.executable, "-c", ENDING], cwd=REPO, capture_output=True, text=True)
+    assert (done.stdout, done.returncode) == ("ended\n", 0), done.stderr
+
+
 BOXING = """
 import signal, sys
 from collections import namedtuple
