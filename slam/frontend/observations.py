@@ -18,7 +18,14 @@ from slam.frames import Features, Float, Frame, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import NEAR_CELLS, face, follow_ends, join, unmixed
-from slam.frontend.visibility import SILENT_M, View, view_of_beams, view_of_features
+from slam.frontend.visibility import (
+    SILENT_M,
+    View,
+    fill,
+    n_bins,
+    view_of_bins,
+    view_of_features,
+)  # fmt: skip
 
 SPACING_M = 0.1  # m; beams closer than this share one weight; set by hand
 LEAST_WEIGHT = 0.3  # share of a full observation, of a near beam; set by hand
@@ -99,7 +106,7 @@ class Observations:
         return other
 
 
-@uncounted
+@inner
 def _scanned(  # noqa: PLR0913 (kernel)
     ranges: NDArray[np.float32],
     angles: NDArray[np.float64],
@@ -166,7 +173,7 @@ def _cleared(
     return count
 
 
-@uncounted
+@inner
 def _surveyed(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     beams: NDArray[np.int64],
@@ -196,6 +203,102 @@ def _surveyed(  # noqa: PLR0913 (kernel)
     return count
 
 
+@inner
+def _order(
+    bearings: NDArray[np.float64], order: NDArray[np.int64], room: NDArray[np.int64]
+) -> None:
+    """Fill ``order`` with the beams by rising bearing, equal ones by number: a merge sort, which
+    copies what is in order already, as most of a scan is."""
+    n, width = len(order), 1
+    for k in range(n):
+        order[k] = k
+    while width < n:
+        for start in range(0, n, 2 * width):
+            middle, end = min(start + width, n), min(start + 2 * width, n)
+            if middle == end or bearings[order[middle - 1]] <= bearings[order[middle]]:
+                continue
+            i, j = start, middle
+            for k in range(start, end):
+                if i < middle and (j == end or bearings[order[i]] <= bearings[order[j]]):
+                    room[k] = order[i]
+                    i += 1
+                else:
+                    room[k] = order[j]
+                    j += 1
+            for k in range(start, end):
+                order[k] = room[k]
+        width *= 2
+
+
+@inner
+def _by_bearing(
+    points: NDArray[np.float64],
+    beams: NDArray[np.int64],
+    bearings: NDArray[np.float64],
+    order: NDArray[np.int64],
+    place: NDArray[np.int64],
+    room: NDArray[np.float64],
+) -> None:
+    """Of an interlaced scanner that turns: neighbours are those by bearing, not by number.
+
+    Puts the points in that order; ``beams`` count the beams in it from now on.
+    """
+    _order(bearings, order, place)
+    place[:] = -1  # of each beam among the points
+    for m in range(len(points)):
+        place[beams[m]] = m
+        room[m, 0], room[m, 1] = points[m, 0], points[m, 1]
+    m = 0
+    for k in range(len(order)):
+        at = place[order[k]]
+        if at >= 0:
+            points[m, 0], points[m, 1], beams[m] = room[at, 0], room[at, 1], k
+            m += 1
+
+
+@uncounted
+def _observed(  # noqa: PLR0913 (kernel)
+    ranges: NDArray[np.float32],
+    angles: NDArray[np.float64],
+    offsets: NDArray[np.float64],
+    T_robot_laser: NDArray[np.float64],
+    twist: NDArray[np.float64],
+    limits: tuple[float, float, float, float],
+    sweep: tuple[float, int, float],
+    near: float,
+    variance: float,
+    interlaced: bool,
+    points: NDArray[np.float64],
+    tangents: NDArray[np.float64],
+    covariances: NDArray[np.float64],
+    weights: NDArray[np.float64],
+    joined: NDArray[np.bool_],
+    facings: NDArray[np.uint8],
+    bins: NDArray[np.float64],
+    room: NDArray[np.float64],
+    beams: NDArray[np.int64],
+) -> tuple[int, float]:
+    """All that one scan shows: how many points there are, and the longest free range.
+
+    ``limits`` as ``_scanned`` takes them, the others as ``_surveyed``; ``interlaced``: beams need
+    not be sent in order. ``bins`` (2, bins) are limits and offsets of a ``View``; ``room`` (3,
+    at least n and bins) and ``beams`` (3, n): room to work in.
+    """
+    n = len(ranges)
+    bearings, free = room[0, :n], room[1, :n]
+    count, rising = _scanned(
+        ranges, angles, offsets, T_robot_laser, twist, limits, points, beams[0], bearings, free
+    )
+    if interlaced and not rising:
+        # tangents are filled later
+        _by_bearing(points[:count], beams[0, :count], bearings, beams[1], beams[2], tangents)
+    left = _surveyed(
+        points[:count], beams[0, :count], T_robot_laser, near, sweep, variance,
+        joined[:count], tangents[:count], facings[:count], covariances, weights,
+    )  # fmt: skip
+    return left, fill(bearings, free, math.tau / bins.shape[1], bins[0], bins[1], room[2])
+
+
 def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     """Beams, moved to where the robot was at the scan's stamp.
 
@@ -209,61 +312,33 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
             f"Odometry.twist must drive at most {MOST_SWEPT_M:g} m during a scan's sweep, "
             f"got {swept_m:g} m"
         )
-    n = spec.n_beams
-    points, bearings, free = np.empty((n, 2)), np.empty(n), np.empty(n)
-    beams = np.empty(n, np.int64)
+    n, config = spec.n_beams, grain.frontend
     use = min(grain.range_m, spec.range_max)
-    config = grain.frontend
-    count, rising = _scanned(
-        scan.ranges,
-        spec.angles,
-        spec.beam_time_offsets,
-        spec.T_robot_laser,
+    sensor_sigma_m = spec.range_sigma_m or config.sensor_sigma_m
+    points, tangents = np.empty((n, 2)), np.empty((n, 2))
+    covariances, weights = np.empty((n, 3)), np.empty(n)
+    joined, facings = np.empty(n, np.bool_), np.empty(n, np.uint8)
+    bins = np.empty((2, n_bins(spec.angle_increment)))
+    left, farthest = _observed(
+        scan.ranges, spec.angles, spec.beam_time_offsets, spec.T_robot_laser,
         np.array(twist),  # one that is fixed would be compiled for once more
         (spec.range_min, spec.range_max, use, min(use, SILENT_M)),
-        points,
-        beams,
-        bearings,
-        free,
-    )
-    points, beams = points[:count], beams[:count]
-    if not rising and spec.sweep_duration > 0.0:
-        points, beams = _by_bearing(points, beams, bearings)
-    sensor_sigma_m = spec.range_sigma_m or config.sensor_sigma_m
-    onward, tangents, facings = (
-        np.empty(count, np.bool_),
-        np.empty((count, 2)),
-        np.empty(count, np.uint8),
-    )
-    covariances, weights = np.empty((count, 3)), np.empty(count)
-    left = _surveyed(
-        points, beams, spec.T_robot_laser, NEAR_CELLS * grain.cell_m,
-        (spec.angle_increment, n, use), max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2,
-        onward, tangents, facings, covariances, weights,
+        (spec.angle_increment, n, use), NEAR_CELLS * grain.cell_m,
+        max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2, spec.sweep_duration > 0.0,
+        points, tangents, covariances, weights, joined, facings, bins,
+        np.empty((3, max(n, bins.shape[1]))), np.empty((3, n), np.int64),
     )  # fmt: skip
-    view = view_of_beams(bearings, free, spec.angle_increment, grain.cell_m)
     return Observations(
         points_robot=points[:left],
         covariances=covariances[:left],
         weights=weights[:left],
         tangents=tangents[:left],
-        joined=onward[:left],
+        joined=joined[:left],
         facings=facings[:left],
-        view=view,
+        view=view_of_bins(bins, farthest, grain.cell_m),
         T_robot_laser=spec.T_robot_laser,
         sensor_sigma_m=sensor_sigma_m,
     )
-
-
-def _by_bearing(
-    points: Float, beams: NDArray[np.int64], bearings: Float
-) -> tuple[Float, NDArray[np.int64]]:
-    """Of an interlaced scanner that turns: neighbours are those by bearing, not by number."""
-    place = np.full(len(bearings), -1)  # of each beam among the points
-    place[beams] = np.arange(len(beams))
-    place = place[np.argsort(bearings, kind="stable")]
-    hits = np.flatnonzero(place >= 0)
-    return points.take(place[hits], axis=0), hits
 
 
 def from_features(features: Features, grain: Grain) -> Observations:

@@ -11,7 +11,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inlined, inner, njit
+from slam._jit import inlined, inner, uncounted
 from slam.frontend.polar import BEARING_OFF, bearing, bin_of
 
 MARGIN_CELLS = 1.5  # cells; a cell seen empty is before a beam's end by this; set by hand
@@ -41,16 +41,20 @@ class View(NamedTuple):
     gate: float
 
 
-@njit
-def _fill(
+@uncounted
+def fill(
     bearings: NDArray[np.float64],
     ranges: NDArray[np.float64],
     step: float,
     limit: NDArray[np.float64],
     offset: NDArray[np.float64],
+    least: NDArray[np.float64],
 ) -> float:
+    """Limits and offsets of a ``View`` from beams in any order; the longest of their free ranges.
+
+    ``least`` (at least bins): room to work in.
+    """
     bins = len(limit)
-    least = np.empty(bins)
     for k in range(bins):
         least[k] = offset[k] = math.inf
     farthest = 0.0
@@ -78,12 +82,21 @@ def view_of_beams(
     cell: float,
 ) -> View:
     """Sort beams (bearing rad, free range m; 0: not measured) into bins of about ``increment``."""
-    bins = max(8, math.floor(math.tau / increment + 1e-6))
-    step = math.tau / bins
-    limit, offset = np.empty(bins), np.empty(bins)
-    farthest = _fill(bearings, free_ranges, step, limit, offset)
+    bins = np.empty((2, n_bins(increment)))
+    step = math.tau / bins.shape[1]
+    farthest = fill(bearings, free_ranges, step, bins[0], bins[1], np.empty(bins.shape[1]))
+    return view_of_bins(bins, farthest, cell)
+
+
+def n_bins(increment: float) -> int:
+    """Bins of about ``increment`` rad round the circle."""
+    return max(8, math.floor(math.tau / increment + 1e-6))
+
+
+def view_of_bins(bins: NDArray[np.float64], farthest: float, cell: float) -> View:
+    """Of limits and offsets (2, bins) that ``fill`` gave."""
     margin, gate = MARGIN_CELLS * cell, GATE_CELLS * cell
-    return View(step, limit, offset, farthest, margin, gate)
+    return View(math.tau / bins.shape[1], bins[0], bins[1], farthest, margin, gate)
 
 
 def view_of_features(points: NDArray[np.float64], cell: float) -> View:
