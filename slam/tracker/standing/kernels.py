@@ -242,6 +242,17 @@ def _along(  # noqa: PLR0913 (kernel)
 
 
 @uncounted
+def placed(
+    points: NDArray[np.float64], pose: NDArray[np.float64], out: NDArray[np.float64]
+) -> None:
+    """``out`` (n, 2): points of the robot frame in the map."""
+    c, s = math.cos(pose[2]), math.sin(pose[2])
+    for k in range(len(points)):
+        x, y = points[k, 0], points[k, 1]
+        out[k, 0], out[k, 1] = c * x - s * y + pose[0], s * x + c * y + pose[1]
+
+
+@uncounted
 def votes(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     joined: NDArray[np.bool_],
@@ -252,9 +263,9 @@ def votes(  # noqa: PLR0913 (kernel)
     lasers: NDArray[np.float64],
     limits: NDArray[np.float64],
     ages: NDArray[np.float64],
-    recent: int,
     before: NDArray[np.float64],
-    ends: NDArray[np.int64],
+    counts: NDArray[np.int64],
+    asked: tuple[int, float, float],
     of: Asking,
     scratch: NDArray[np.float64],
     bins: NDArray[np.int64],
@@ -265,21 +276,25 @@ def votes(  # noqa: PLR0913 (kernel)
     Returns the share of the points whose places any of the scans asked had in view.
 
     limit   (bins,) free ranges of the present scan, seen from ``T_map_laser``
-    lasers, limits, ages, recent  of the scans asked, see ``_emptied``
-    before  (m, 2) points in the map of those whose things may have left; ends (L,) of each scan's
+    lasers, limits, ages  of the scans asked, newest first, see ``_emptied``
+    before  (J, w, 2) points in the map of each scan, of which it has ``counts`` (J,)
+    asked   how many scans; s up to which they may have seen a place empty, and things left one
     scratch (6, at least n + 1, and points of any scan before), bins (2, bins): room to work in
     """
     n = len(points)
     stood, own, polar, first, last = scratch[0], scratch[1], scratch[2:], bins[0], bins[1]
+    recent, lately = 0, 0  # the first ones: ages rise
+    while recent < asked[0] and ages[recent] <= asked[1]:
+        recent += 1
+    while lately < asked[0] and ages[lately] <= asked[2]:
+        lately += 1
     in_view = _emptied(points, pose, lasers, limits, ages, of, recent, polar, own, stood)
     _indexed(points, T_robot_laser, of.step, first, last)
-    start = 0
-    for j in range(len(ends)):
+    for j in range(lately):
         _left(
-            before[start : ends[j]], ages[j], points, T_map_laser, T_robot_laser, limit, of,
+            before[j, : counts[j]], ages[j], points, T_map_laser, T_robot_laser, limit, of,
             first, last, polar, stood,
         )  # fmt: skip
-        start = ends[j]
     for k in range(n):
         ratio = of.settled_s / max(stood[k], 1e-300)
         own[k] = 1.0 - of.sure * (1.0 - 1.0 / (1.0 + ratio * ratio))

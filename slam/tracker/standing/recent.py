@@ -2,9 +2,9 @@
 """The scans of the last seconds, kept to say which present returns come from what stands."""
 
 import math
-from collections import deque
+from bisect import bisect_right
 from dataclasses import dataclass, replace
-from itertools import accumulate
+from operator import attrgetter
 
 import numpy as np
 
@@ -13,9 +13,9 @@ from slam.frames import NS_PER_S, Float
 from slam.frontend.observations import Observations
 from slam.tracker.standing.agreement import Agreement
 from slam.tracker.standing.config import StandingConfig
-from slam.tracker.standing.kernels import Asking, votes
+from slam.tracker.standing.kernels import Asking, placed, votes
 
-NO_POINTS = np.empty((0, 2))
+_stamp_of = attrgetter("stamp_ns")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -32,6 +32,35 @@ class Look:
     step: float
 
 
+class _Asked:
+    """The scans that are asked, side by side as the kernel takes them: from one present scan to the
+    next only the newest is another, and no more is copied.
+
+    lasers (k, 3), limits (k, bins), points (k, width, 2) of ``Look``; counts (k,) of the points
+    """
+
+    def __init__(self, most: int, bins: int, width: int) -> None:
+        self.lasers, self.limits = np.empty((most, 3)), np.empty((most, bins))
+        self.points, self.counts = np.empty((most, width, 2)), np.zeros(most, np.int64)
+        self.ages_s = np.empty(most)
+        self.scratch, self.bins = np.empty((6, width + 1)), np.empty((2, bins), np.int64)
+        self._held: list[Look | None] = [None] * most
+
+    def fits(self, bins: int, width: int) -> bool:
+        """Whether there is room for scans like that."""
+        return self.limits.shape[1] == bins and self.points.shape[1] >= width
+
+    def take(self, looks: list[Look], stamp_ns: int) -> None:
+        """Hold these, as they are at that time."""
+        for k, look in enumerate(looks):
+            self.ages_s[k] = (stamp_ns - look.stamp_ns) / NS_PER_S
+            if self._held[k] is not look:
+                self.lasers[k], self.limits[k] = look.T_map_laser, look.limit
+                n = self.counts[k] = len(look.points_map)
+                self.points[k, :n] = look.points_map
+                self._held[k] = look
+
+
 class Standing:
     """Gives each return its vote, by how long its place was not seen empty.
 
@@ -40,10 +69,13 @@ class Standing:
 
     def __init__(self, config: StandingConfig) -> None:
         self._config, self.agreement = config, Agreement(config)
-        self._looks: deque[Look] = deque()
+        self._looks: list[Look] = []
         # a little less, as scans come when they come
         first_s = 0.95 * config.spacing_s
-        self._ages_s = [first_s * config.ages_grow**k for k in range(config.views)]
+        ages_s = [first_s * config.ages_grow**k for k in range(config.views)]
+        self._ages_ns = [whole_ns(age_s) for age_s in ages_s]
+        self._oldest_ns = round(1.5 * ages_s[-1] * NS_PER_S)
+        self._room = _Asked(0, 0, 0)
 
     def add(self, stamp_ns: int, T_map_robot: Float, seen: Observations) -> None:
         """Keep a scan that was tracked."""
@@ -52,43 +84,48 @@ class Standing:
         looks, config = self._looks, self._config
         if len(looks) > 1 and stamp_ns - looks[-2].stamp_ns < config.spacing_s * NS_PER_S:
             looks.pop()  # the newest is always there
+        points_map = np.empty(seen.points_robot.shape)
+        placed(seen.points_robot, T_map_robot, points_map)
         looks.append(
             Look(
                 stamp_ns=stamp_ns,
                 T_map_laser=se2.compose(T_map_robot, seen.T_robot_laser),
-                points_map=se2.transform(T_map_robot, seen.points_robot),
+                points_map=points_map,
                 limit=seen.view.limit,
                 step=seen.view.step,
             )
         )
-        oldest = stamp_ns - round(1.5 * self._ages_s[-1] * NS_PER_S)
+        oldest = stamp_ns - self._oldest_ns
         while looks[0].stamp_ns < oldest:
-            looks.popleft()
+            del looks[0]
 
     def moved(self, T_new_old: Float) -> None:
         """The map moved: so did what was seen in it."""
         self.agreement.turned(float(T_new_old[2]))
-        self._looks = deque(
+        self._looks = [
             replace(
                 look,
                 T_map_laser=se2.compose(T_new_old, look.T_map_laser),
                 points_map=se2.transform(T_new_old, look.points_map),
             )
             for look in self._looks
-        )
+        ]
 
     def _asked(self, stamp_ns: int, step: float) -> list[Look]:
         """The newest, and of the others about one of each age."""
-        chosen: list[Look] = []
-        least = -math.inf
-        for look in reversed(self._looks):
-            age = (stamp_ns - look.stamp_ns) / NS_PER_S
-            if age >= least and look.step == step:
-                chosen.append(look)
-                older = [least_s for least_s in self._ages_s if least_s > age]
-                if not older:
-                    break
-                least = older[0]
+        looks, chosen = self._looks, []
+        k = len(looks)
+        while k > 0:
+            look = looks[k - 1]
+            if look.step != step:
+                k -= 1
+                continue
+            chosen.append(look)
+            age = stamp_ns - look.stamp_ns
+            older = bisect_right(self._ages_ns, age)
+            if older == len(self._ages_ns):
+                break
+            k = bisect_right(looks, stamp_ns - self._ages_ns[older], 0, k - 1, key=_stamp_of)
         return chosen
 
     def with_votes(
@@ -102,7 +139,6 @@ class Standing:
         asked = self._asked(stamp_ns, seen.view.step) if config.settled_s > 0.0 else []
         if not asked or not len(points):
             return seen.with_votes(np.ones(len(points)))
-        ages = [(stamp_ns - look.stamp_ns) / NS_PER_S for look in asked]
         place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])
         margin = config.margin_m + config.sigmas * math.sqrt(place)
         spread = math.radians(config.spread_deg) + config.sigmas * math.sqrt(heading)
@@ -117,18 +153,23 @@ class Standing:
             along_m=config.along_m,
             thin_m=config.thin_m,
         )
-        newest = sum(age <= config.left_s for age in ages)
-        lately = [look.points_map for look in asked[:newest]]
-        limit, width = seen.view.limit, max(map(len, [*lately, points])) + 1
+        bins, width = len(seen.view.limit), max(len(look.points_map) for look in asked)
+        room = self._room
+        if not room.fits(bins, max(width, len(points))):
+            most = len(self._ages_ns) + 1
+            room = self._room = _Asked(most, bins, 2 * max(width, len(points)))
+        room.take(asked, stamp_ns)
         out = np.empty(len(points))
         in_view = votes(
-            points, seen.joined, limit, T_map_robot,
+            points, seen.joined, seen.view.limit, T_map_robot,
             se2.compose(T_map_robot, seen.T_robot_laser), seen.T_robot_laser,
-            np.array([look.T_map_laser for look in asked]),
-            np.array([look.limit for look in asked]), np.array(ages),
-            sum(age <= config.came_s for age in ages),
-            np.concatenate(lately) if lately else NO_POINTS,
-            np.array(list(accumulate(map(len, lately))), np.int64), asking,
-            np.empty((6, width)), np.empty((2, len(limit)), np.int64), out,
+            room.lasers, room.limits, room.ages_s, room.points, room.counts,
+            (len(asked), config.came_s, config.left_s), asking, room.scratch, room.bins, out,
         )  # fmt: skip
         return seen.with_votes(out, in_view)
+
+
+def whole_ns(seconds: float) -> int:
+    """The least whole ns that are that many seconds or more, as a division has them."""
+    near = round(seconds * NS_PER_S)
+    return next((k for k in range(near - 1, near + 2) if k / NS_PER_S >= seconds), near)

@@ -12,7 +12,7 @@ from slam.frontend.observations import Observations, from_scan
 from slam.shunting.slam import ShuntingConfig
 from slam.tracker.matching.matcher import Matcher, seen_by
 from slam.tracker.standing.config import ALL_VOTE, StandingConfig
-from slam.tracker.standing.recent import Standing
+from slam.tracker.standing.recent import Standing, whole_ns
 from tests.slam.tracker.matching.test_matcher import CONFIG, room
 from tests.world2d import World2D, laser, rectangle
 
@@ -150,3 +150,51 @@ def test_without_a_vote_what_is_young_says_nothing_and_is_not_missed() -> None:
 
 def _voting(scan: Observations, given: Array) -> Observations:
     return replace(scan, votes=given)
+
+
+@pytest.mark.parametrize("seconds", [0.19, 0.475, 1.1875, 2.96875, 7.421875, 1e-9, 3e17])
+def test_whole_ns_say_the_same_as_seconds(seconds: float) -> None:
+    least = whole_ns(seconds)
+    assert least / NS_PER_S >= seconds
+    assert (least - 1) / NS_PER_S < seconds or seconds > 1e6
+
+
+def test_one_of_each_age_is_asked_however_often_scans_come() -> None:
+    now, rng = seen(), np.random.default_rng(3)
+    for gap_s in (0.027, 0.2, 0.7, 5.0):
+        standing, stamp_ns = Standing(NUMBERS), 0
+        for _ in range(150):
+            standing.add(stamp_ns, HERE, now)
+            stamp_ns += round(rng.uniform(0.5, 1.5) * gap_s * NS_PER_S)
+            ages_s = [0.95 * NUMBERS.spacing_s * NUMBERS.ages_grow**k for k in range(NUMBERS.views)]
+            wanted, least_s = [], -np.inf
+            for look in reversed(standing._looks):
+                age_s = (stamp_ns - look.stamp_ns) / NS_PER_S
+                if age_s >= least_s:
+                    wanted.append(look)
+                    least_s = min((a for a in ages_s if a > age_s), default=np.inf)
+            assert standing._asked(stamp_ns, now.view.step) == wanted
+        assert standing._asked(stamp_ns, 0.5 * now.view.step) == []
+
+
+def test_scans_of_any_size_and_a_map_that_moved_are_asked_alike() -> None:
+    fewer = seen(box(2.0, 0.0))
+    fewer = replace(
+        fewer,
+        **{
+            name: getattr(fewer, name)[:90].copy()
+            for name in ("points_robot", "covariances", "weights", "tangents", "joined", "facings")
+        },
+    )
+    scans, stamps_ns = [seen(), fewer, seen(box(1.0, 1.0))], [0, NS_PER_S // 4, NS_PER_S // 2]
+    going_on = Standing(NUMBERS)
+    for k, (scan, stamp_ns) in enumerate(zip(scans, stamps_ns, strict=True)):
+        going_on.add(stamp_ns, HERE, scan)
+        going_on.with_votes(stamp_ns + 10**7, HERE, SURE, scan)
+        by = np.array([0.1 * k, 0.0, 0.0])
+        going_on.moved(by)
+        fresh = Standing(NUMBERS)
+        fresh._looks = list(going_on._looks)
+        a, b = (s.with_votes(NS_PER_S, by, SURE, scan).votes for s in (going_on, fresh))
+        assert a is not None
+        np.testing.assert_array_equal(a, b)
