@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 
 from slam import se2
+from slam._jit import inner, uncounted
 from slam.errors import InvalidValueError
 from slam.frames import MOST_TWIST, Float, Odometry
 from slam.frontend.config import FRONTEND, BiasConfig
@@ -104,20 +105,36 @@ def _of_heading(information: Float) -> float:
     return max(left, 0.0)
 
 
-IDENTITY = np.eye(3)
+Pair = tuple[float, float]
+NO_SLIP: Float = np.zeros((3, 3))
 # Guard against rounding: least variance of a matrix left singular, m^2 and rad^2: (1 um, 1 urad)^2
 SINGULAR = 1e-12
 
 
+@inner
+def turn(covariance: Float, theta: float, out: Float) -> None:
+    """As ``turned``, into ``out``."""
+    c, s = math.cos(theta), math.sin(theta)
+    xx, xy, xt = covariance[0, 0], covariance[0, 1], covariance[0, 2]
+    yy, yt = covariance[1, 1], covariance[1, 2]
+    out[0, 0] = c * c * xx - 2.0 * c * s * xy + s * s * yy
+    out[0, 1] = out[1, 0] = c * s * (xx - yy) + (c * c - s * s) * xy
+    out[1, 1] = s * s * xx + 2.0 * c * s * xy + c * c * yy
+    out[0, 2] = out[2, 0] = c * xt - s * yt
+    out[1, 2] = out[2, 1] = s * xt + c * yt
+    out[2, 2] = covariance[2, 2]
+
+
+@uncounted
+def _turned(covariance: Float, theta: float, out: Float) -> None:
+    turn(covariance, theta, out)
+
+
 def turned(covariance: Float, theta: float) -> Float:
     """A (3, 3) covariance of a motion in axes turned by -theta; products in a fixed order."""
-    c, s = math.cos(theta), math.sin(theta)
-    (xx, xy, xt), (_, yy, yt), (_, _, tt) = covariance.tolist()
-    a = c * c * xx - 2.0 * c * s * xy + s * s * yy
-    b = c * s * (xx - yy) + (c * c - s * s) * xy
-    d = s * s * xx + 2.0 * c * s * xy + c * c * yy
-    e, f = c * xt - s * yt, s * xt + c * yt
-    return np.array([[a, b, e], [b, d, f], [e, f, tt]])
+    out = np.empty((3, 3))
+    _turned(np.ascontiguousarray(covariance), theta, out)
+    return out
 
 
 def upper_inverted(
@@ -133,22 +150,49 @@ def upper_inverted(
     return aa / det, ab / det, ac / det, bb / det, bc / det, cc / det
 
 
+@inner
+def inverse(m: Float, out: Float) -> None:
+    """As ``inverted``, into ``out``."""
+    a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
+    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
+    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
+    det = a * aa + b * ab + c * ac
+    if det <= 0.0:
+        aa, bb, cc = 1.0 / max(a, SINGULAR), 1.0 / max(d, SINGULAR), 1.0 / max(f, SINGULAR)
+        ab = ac = bc = 0.0
+        det = 1.0
+    out[0, 0], out[0, 1], out[0, 2] = aa / det, ab / det, ac / det
+    out[1, 0], out[1, 1], out[1, 2] = ab / det, bb / det, bc / det
+    out[2, 0], out[2, 1], out[2, 2] = ac / det, bc / det, cc / det
+
+
+@uncounted
+def _squared(off: Float, covariance: Float, room: Float) -> float:
+    inverse(covariance, room)
+    x, y, t = off[0], off[1], off[2]
+    a, b, c = room[0, 0], room[0, 1], room[0, 2]
+    d, e, f = room[1, 1], room[1, 2], room[2, 2]
+    return float(x * (a * x + 2.0 * (b * y + c * t)) + y * (d * y + 2.0 * e * t) + f * t * t)
+
+
+@uncounted
+def _inverted(matrix: Float, out: Float) -> None:
+    inverse(matrix, out)
+
+
 def inverted(matrix: Float) -> Float:
     """Inverse of a symmetric positive definite (3, 3) matrix, in a fixed order of operations.
 
     One that rounding has left singular is taken without its correlations.
     """
-    (a, b, c), (_, d, e), (_, _, f) = matrix.tolist()
-    a, b, c, d, e, f = upper_inverted(a, b, c, d, e, f)
-    return np.array([[a, b, c], [b, d, e], [c, e, f]])
+    out = np.empty((3, 3))
+    _inverted(np.ascontiguousarray(matrix), out)
+    return out
 
 
 def squared(off: Float, covariance: Float) -> float:
     """``off`` (3,) in deviations, squared: off' inv(covariance) off in a fixed order."""
-    x, y, t = off.tolist()
-    (a, b, c), (_, d, e), (_, _, f) = inverted(covariance).tolist()
-    form: float = x * (a * x + 2.0 * (b * y + c * t)) + y * (d * y + 2.0 * e * t) + f * t * t
-    return form
+    return _squared(off, np.ascontiguousarray(covariance), np.empty((3, 3)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -204,7 +248,7 @@ class Prediction:
 def known(covariance: Float, most_m: float = MOST_STD, most_rad: float = MOST_STD) -> Float:
     """A copy of an increment's covariance (3, 3) with standard deviations lowered to at most
     these, the correlations kept: beyond, they mean "not known"."""
-    out = np.array(covariance, dtype=np.float64)
+    out = np.array(covariance, dtype=np.float64, order="C")
     most = zip(out.diagonal().tolist(), (most_m, most_m, most_rad), strict=True)
     scale = [min(1.0, limit / math.sqrt(v)) if v > 0.0 else 1.0 for v, limit in most]
     if min(scale) < 1.0:
@@ -215,6 +259,9 @@ def known(covariance: Float, most_m: float = MOST_STD, most_rad: float = MOST_ST
 def invertible(covariance: Float) -> Float:
     """``known``, and such that its inverse can be computed: the very numbers, unless a variance is
     ``HUGE``."""
+    (xx, _, _), (_, yy, _), (_, _, tt) = covariance.tolist()
+    if max(xx, yy, tt) <= HUGE:
+        return np.array(covariance, dtype=np.float64, order="C")
     out = known(covariance)
     xx, yy, tt = out.diagonal().tolist()
     if max(xx, yy, tt) > HUGE:
@@ -226,20 +273,22 @@ def invertible(covariance: Float) -> Float:
 
 def motion(before: Odometry, now: Odometry) -> Float:
     """(3,) ``T_before_now``. Raises ``InvalidValueError`` for a step that no robot makes."""
-    x, y, _ = before.T_odom_robot.tolist()
-    x_now, y_now, _ = now.T_odom_robot.tolist()
+    x, y, turn = before.T_odom_robot.tolist()
+    x_now, y_now, turn_now = now.T_odom_robot.tolist()
     distance = math.hypot(x_now - x, y_now - y)
     if not distance <= MOST_STEP_M:
         raise InvalidValueError(
             f"Odometry.T_odom_robot must move by at most {MOST_STEP_M:g} m from frame to frame, "
             f"got {distance:g} m from {before.stamp_ns} ns to {now.stamp_ns} ns"
         )
-    for odometry in (before, now):
-        farthest = max(map(abs, odometry.T_odom_robot.tolist()))
+    for stamp_ns, farthest in (
+        (before.stamp_ns, max(abs(x), abs(y), abs(turn))),
+        (now.stamp_ns, max(abs(x_now), abs(y_now), abs(turn_now))),
+    ):
         if farthest > MOST_POSE:
             raise InvalidValueError(
                 f"Odometry.T_odom_robot must lie within {MOST_POSE:g} m and rad, got {farthest:g} "
-                f"at {odometry.stamp_ns} ns"
+                f"at {stamp_ns} ns"
             )
     return se2.between(before.T_odom_robot, now.T_odom_robot)
 
@@ -253,60 +302,83 @@ def assumed_covariance(increment: Float) -> Float:
     return np.diag([sd_xy**2, sd_xy**2, sd_theta**2])
 
 
-def _widened(covariance: Float, widths: tuple[float, float], floor: tuple[float, float]) -> Float:
+@inner
+def _widen(covariance: Float, widths: Pair, floor: Pair, out: Float) -> None:
     """Standard deviations of position and heading times ``widths``, variances plus ``floor``."""
-    (xx, xy, xt), (yx, yy, yt), (tx, ty, tt) = covariance.tolist()
-    (a, b), (m2, rad2) = widths, floor
-    return np.array(
-        [
-            [xx * a * a + m2, xy * a * a, xt * a * b],
-            [yx * a * a, yy * a * a + m2, yt * a * b],
-            [tx * b * a, ty * b * a, tt * b * b + rad2],
-        ]
-    )
+    a, b = widths
+    for i in range(2):
+        for j in range(2):
+            out[i, j] = covariance[i, j] * a * a
+        out[i, i] += floor[0]
+        out[i, 2] = covariance[i, 2] * a * b
+    out[2, 2] = covariance[2, 2] * b * b + floor[1]
+
+
+@uncounted
+def _scaled(  # noqa: PLR0913 (kernel)
+    unscaled: Float,
+    theta: float,
+    widths: Pair,
+    floor: Pair,
+    more: Pair,
+    rest: Pair,
+    slip: Float,
+    room: Float,
+    covariance: Float,
+    loosened: Float,
+) -> None:
+    """``unscaled`` gets ``LEAST_VARIANCE``; ``covariance``: of it with ``widths`` and ``floor`` in
+    axes turned by -theta, plus ``slip``; ``loosened``: of it with ``more`` and ``rest`` there."""
+    for i in range(3):
+        unscaled[i, i] += LEAST_VARIANCE
+    _widen(unscaled, widths, floor, room)
+    turn(room, theta, covariance)
+    for i in range(3):
+        for j in range(3):
+            covariance[i, j] += slip[i, j]
+    _widen(unscaled, more, rest, room)
+    turn(room, theta, loosened)
 
 
 def predict(
     T_map_before: Float,
     before: Odometry,
     now: Odometry,
-    scales: tuple[float, float] = (1.0, 1.0),
+    scales: Pair = (1.0, 1.0),
     bias: HeadingBias | None = None,
+    slip: Float = NO_SLIP,
 ) -> Prediction:
     """Chain the odometry increment on the last pose; covariance from the frame's own.
 
     ``scales`` multiply its variance of translation and of rotation; ``bias`` is taken out of the
-    increment.
+    increment. With wheels that slip the increment may be off by ``slip`` (3, 3) more.
     """
     increment = motion(before, now)
     if bias is not None:
         increment = bias.corrected(increment)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
-    given = now.increment_covariance
-    if given is None:
-        unscaled = assumed_covariance(increment)
-    else:
-        unscaled = invertible(given)
-    unscaled = unscaled + LEAST_VARIANCE * IDENTITY
+    given, (along, turning) = now.increment_covariance, scales
+    unscaled = assumed_covariance(increment) if given is None else invertible(given)
     share = min(max(elapsed, 1e-3), FLOOR_MOST_S) / FLOOR_S
     floor = share * FLOOR_M**2, share * FLOOR_RAD**2
-    widths = math.sqrt(scales[0]), math.sqrt(scales[1])
-    in_robot = _widened(unscaled, widths, floor)
-    loosened = np.zeros((3, 3))
+    more = rest = 0.0, 0.0
     if given is not None:
         more = (
-            math.sqrt(max(LEAST_SCALE - scales[0], 0.0)),
-            math.sqrt(max(LEAST_SCALE - scales[1], 0.0)),
+            math.sqrt(max(LEAST_SCALE - along, 0.0)),
+            math.sqrt(max(LEAST_SCALE - turning, 0.0)),
         )
-        least = share * LEAST_M**2, share * LEAST_RAD**2
-        rest = least[0] - floor[0], least[1] - floor[1]
-        loosened = _widened(unscaled, more, rest)
+        rest = share * LEAST_M**2 - floor[0], share * LEAST_RAD**2 - floor[1]
+    covariance, loosened = np.empty((3, 3)), np.empty((3, 3))
+    _scaled(
+        unscaled, float(T_map_before[2]), (math.sqrt(along), math.sqrt(turning)), floor, more, rest,
+        slip, np.empty((3, 3)), covariance, loosened,
+    )  # fmt: skip
     return Prediction(
         T_map_robot=se2.compose(T_map_before, increment),
         increment=increment,
-        covariance=turned(in_robot, float(T_map_before[2])),
+        covariance=covariance,
         unscaled=unscaled,
-        loosened=turned(loosened, float(T_map_before[2])),
+        loosened=loosened,
         floor=floor,
         twist=_twist(now, increment, elapsed),
         elapsed=elapsed,

@@ -10,24 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frontend.odometry_prior import SINGULAR
-
-
-@inner
-def inverse(m: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """Inverse of a symmetric positive definite (3, 3); of one that rounding left singular, without
-    its correlations."""
-    a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
-    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
-    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
-    det = a * aa + b * ab + c * ac
-    if det <= 0.0:
-        aa, bb, cc = 1.0 / max(a, SINGULAR), 1.0 / max(d, SINGULAR), 1.0 / max(f, SINGULAR)
-        ab = ac = bc = 0.0
-        det = 1.0
-    out[0, 0], out[0, 1], out[0, 2] = aa / det, ab / det, ac / det
-    out[1, 0], out[1, 1], out[1, 2] = ab / det, bb / det, bc / det
-    out[2, 0], out[2, 1], out[2, 2] = ac / det, bc / det, cc / det
+from slam.frontend.odometry_prior import inverse
 
 
 @inner

@@ -15,24 +15,33 @@ from typing import Self
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import inner, njit
 from slam.frames import Float, Odometry
-from slam.frontend.odometry_prior import HeadingBias, Prediction, predict, squared, turned
+from slam.frontend.odometry_prior import (
+    HeadingBias,
+    Prediction,
+    inverse,
+    predict,
+    squared,
+    turn,
+)  # fmt: skip
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
-from slam.tracker.uncertainty.covariances import inverse, plus
+from slam.tracker.uncertainty.covariances import plus
 
 SLIP = 12.0  # squared innovation of three numbers that noise exceeds in 0.7 %; set by hand
 SLIP_S = 0.2  # s that a slip lasts in the mean; set by hand: station, 0.6 rad in 0.6 s
 SLIP_STEP_S = 0.15  # s, longest step: slower scans see no slip twice
 
 
-def _across(covariance: Float, across: tuple[float, float]) -> float:
+@inner
+def _across(covariance: NDArray[np.float64], across: tuple[float, float]) -> float:
     """Variance of the position along a unit vector; of both directions where that is zero."""
-    (a, b, _), (_, d, _), _ = covariance.tolist()
+    a, b, d = covariance[0, 0], covariance[0, 1], covariance[1, 1]
     x, y = across
-    variance: float = a + d if x == y == 0.0 else x * x * a + 2.0 * x * y * b + y * y * d
-    return variance
+    if x == 0.0 and y == 0.0:
+        return float(a + d)
+    return float(x * x * a + 2.0 * x * y * b + y * y * d)
 
 
 @njit
@@ -73,6 +82,33 @@ def innovation(
         place = (x * e[0] + y * e[1]) ** 2
         variance = x * x * R[0, 0] + 2.0 * x * y * R[0, 1] + y * y * R[1, 1]
     return nis, place, e[2] * e[2], share * variance, share * R[2, 2]
+
+
+@njit
+def compared(  # noqa: PLR0913 (kernel)
+    covariance: NDArray[np.float64],
+    carried: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    unscaled: NDArray[np.float64],
+    start: float,
+    data: NDArray[np.float64],
+    off: NDArray[np.float64],
+    share: float,
+    across: tuple[float, float],
+) -> tuple[float, float, float, float, float, float, float, float, float]:
+    """``innovation`` of an increment with that ``covariance`` from a pose off by what odometry
+    ``carried`` there; then, of the step as stated (``unscaled``, in axes turned by -start) and of
+    what was carried, the variances of position (see ``across``) and of heading.
+    """
+    step = np.empty((3, 3))
+    turn(unscaled, start, step)
+    nis, place, heading, of_place, of_heading = innovation(
+        plus(covariance, 1.0, carried), prior, data, off, share, across
+    )
+    return (
+        nis, place, heading, of_place, of_heading,
+        _across(step, across), step[2, 2], _across(carried, across), carried[2, 2],
+    )  # fmt: skip
 
 
 class OdometryNoise:
@@ -139,9 +175,9 @@ class OdometryNoise:
             self.scales = np.array(self._squares) / self._expected
         along, turning = self.scales.tolist()
         self._stated = stated
-        prediction = predict(T_map_before, before, now, (along, turning), self.bias)
-        self._slip = math.exp(-max(prediction.elapsed, 0.0) / SLIP_S) * self._slip
-        return prediction.changed(covariance=prediction.covariance + self._slip)
+        elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
+        self._slip = math.exp(-max(elapsed, 0.0) / SLIP_S) * self._slip
+        return predict(T_map_before, before, now, (along, turning), self.bias, self._slip)
 
     def note_slip(self, prediction: Prediction, match: Match) -> None:
         """Ask it of a match, to the map or to a local copy."""
@@ -172,25 +208,23 @@ class OdometryNoise:
         data = match.tau * match.information
         share = min(match.tau * self.noise_share(sensor_sigma_m), 1.0)
         across = (0.0, 0.0) if along_rad is None else (-math.sin(along_rad), math.cos(along_rad))
-        self.nis, *found = innovation(
-            prediction.covariance + prediction.carried, prediction.prior, data, off, share, across
-        )
         start = float(prediction.T_map_robot[2]) - float(prediction.increment[2])
-        of_step = turned(prediction.unscaled, start)
-        c, t = float(of_step[2, 2]), float(prediction.carried[2, 2])
-        of_place, of_carried = _across(of_step, across), _across(prediction.carried, across)
+        self.nis, place, heading, of_match, match_rad2, of_place, c, of_carried, t = compared(
+            prediction.covariance, prediction.carried, prediction.prior, prediction.unscaled,
+            start, data, off, share, across,
+        )  # fmt: skip
         floor_m2, floor_rad2 = prediction.floor
         floors_m2 = floor_m2 * (2.0 if along_rad is None else 1.0)
         config = self._config
         frames = max(config.memory, config.memory_s / max(prediction.elapsed, 1e-3))
         keep = math.exp(-1.0 / frames)
         scales: list[float] = self.scales.tolist()
-        for k, unit, rest in (
-            (0, of_place, floors_m2 + of_carried + found[2]),
-            (1, c, floor_rad2 + t + found[3]),
+        for k, found, unit, rest in (
+            (0, place, of_place, floors_m2 + of_carried + of_match),
+            (1, heading, c, floor_rad2 + t + match_rad2),
         ):
             expected = scales[k] * unit + rest
-            square = min(found[k], config.wild * expected)
+            square = min(found, config.wild * expected)
             # Least squares of square = scale * unit + rest, weighed by what scatter to expect.
             weight = unit / expected**2
             self._squares[k] = keep * self._squares[k] + weight * (square - rest)
