@@ -15,8 +15,9 @@ from typing import Any
 import numpy as np
 
 from slam._jit import announced
-from slam.frames import NS_PER_S, LaserSpec, Scan
+from slam.frames import NS_PER_S, LaserSpec, Odometry, Scan
 from slam.frontend.observations import Observations, from_scan
+from slam.frontend.odometry_prior import inverted, predict, squared
 from slam.posegraph import Edge, optimise
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
@@ -28,8 +29,8 @@ from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.recent import Standing
-from slam.tracker.uncertainty.covariances import advance, carried, observable, root_share
-from slam.tracker.uncertainty.odometry_noise import innovation
+from slam.tracker.uncertainty.covariances import carried, followed, observable
+from slam.tracker.uncertainty.odometry_noise import compared
 from slam.tracker.uncertainty.residuals import look
 
 COMPILE_S = 10.0  # of one core of a Xeon, measured
@@ -54,22 +55,19 @@ def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None
     matcher, origin, covariance = Matcher(config), np.zeros(3), np.diag([0.1, 0.1, 0.1])
     seen = from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), config)
     look(cell_map, 0.3, seen, origin, (1.0, 0.0), 0)
-    whole = [np.eye(3) for _ in range(4)]
-    advance(
-        whole[0],
-        whole[1],
-        whole[2],
-        whole[3],
-        origin,
-        covariance,
-        covariance,
-        (1.0, 1.0, 1.0, 1.0),
-        covariance,
-    )
-    root_share((1.0, 0.0, 1.0), covariance, 1.0, np.eye(2))
+    times = (1.0, 1.0, 1.0, 1.0)
+    followed(
+        np.eye(3), np.eye(3), np.eye(3), np.eye(3), origin, origin, covariance, covariance,
+        (1.0, 0.0, 1.0, 1.0, 1.0), times, times, np.eye(3),
+    )  # fmt: skip
     carried(covariance, origin, 0.0, 0.0, np.eye(3))
     observable(covariance, 0.0, 2.0, np.eye(3))
-    innovation(covariance, covariance, covariance, origin, 1.0, (0.0, 0.0))
+    still = [
+        Odometry(stamp_ns=k, T_odom_robot=origin, increment_covariance=covariance) for k in (0, 1)
+    ]
+    prior = predict(origin, still[0], still[1]).covariance
+    squared(origin, prior)
+    compared(prior, prior, prior, prior, 0.0, prior, origin, 1.0, (0.0, 0.0))
     for one in (cell_map, *others):
         for write in (False, True):
             rasterise(one, seen, origin)
@@ -78,7 +76,7 @@ def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None
     standing.add(0, origin, seen)
     standing.with_votes(NS_PER_S // 2, origin, covariance, seen)
     start = matcher.approach(cell_map, seen, origin, covariance)
-    matcher.climb(cell_map, seen, start, origin, np.linalg.inv(covariance))
+    matcher.climb(cell_map, seen, start, origin, inverted(covariance))
     _search(cell_map, matcher, seen)
     cell_map.window(0.0, 0.0, 1.0, 1.0)
     optimise(np.zeros((2, 3)), [Edge(a=0, b=1, T_a_b=origin, information=np.eye(3))])

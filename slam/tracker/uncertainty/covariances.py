@@ -69,7 +69,7 @@ def observable(
     return lost, math.atan2(c, -s)
 
 
-@njit
+@inner
 def root_share(
     part: tuple[float, float, float],
     whole: NDArray[np.float64],
@@ -93,7 +93,7 @@ def root_share(
     out[1, 1] = s * s * one + c * c * other
 
 
-@njit
+@inner
 def advance(  # noqa: C901, PLR0913 (kernel)
     drift: NDArray[np.float64],
     blind: NDArray[np.float64],
@@ -151,6 +151,54 @@ def advance(  # noqa: C901, PLR0913 (kernel)
             shared[i, j] = turns * variances[0] * moved[i, j]
             newest[i, j] = turns * variances[1] * moved[i, j] + kept[i, j]
             drift[i, j] += newest[i, j]
+
+
+@njit
+def followed(  # noqa: PLR0913 (kernel)
+    drift: NDArray[np.float64],
+    blind: NDArray[np.float64],
+    shared: NDArray[np.float64],
+    newest: NDArray[np.float64],
+    T_map_before: NDArray[np.float64],
+    T_map_robot: NDArray[np.float64],
+    prior: NDArray[np.float64],
+    geometry: NDArray[np.float64],
+    written: tuple[float, float, float, float, float],
+    matched: tuple[float, float, float, float],
+    variances: tuple[float, float, float, float],
+    out: NDArray[np.float64],
+) -> tuple[int, float]:
+    """One frame: ``root_share`` and ``observable`` of ``geometry``, then ``advance``; their sum in
+    ``out`` (3, 3). Returns what ``observable`` does, and (2, 0) where no match was used.
+
+    written  the part of ``root_share``, its times (0: nothing was), and the same share of headings
+    matched  strength of the match (0: not used), 1 over the weight of ``geometry``, and the other
+             two numbers of ``observable``
+    """
+    share, data = np.zeros((3, 3)), np.zeros((3, 3))
+    if written[3] > 0.0:
+        root_share((written[0], written[1], written[2]), geometry, written[3], share)
+        share[2, 2] = math.sqrt(min(written[3] * written[4], 1.0))
+    motion, view = np.empty(3), np.empty((3, 3))
+    strength = matched[0]
+    lost, along = 2, 0.0
+    if strength > 0.0:
+        for i in range(3):
+            for j in range(3):
+                view[i, j] = geometry[i, j] * matched[1]
+        lost, along = observable(view, matched[2], matched[3], data)
+    for i in range(3):
+        motion[i] = T_map_robot[i] - T_map_before[i]
+        for j in range(3):
+            if strength > 0.0:
+                data[i, j] *= strength
+            else:
+                blind[i, j] += shared[i, j]
+    advance(drift, blind, shared, newest, motion, prior, data, variances, share)
+    for i in range(3):
+        for j in range(3):
+            out[i, j] = drift[i, j] + blind[i, j] + shared[i, j]
+    return lost, along
 
 
 @njit

@@ -22,7 +22,7 @@ from slam.frames import Float
 from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
-from slam.tracker.uncertainty.covariances import advance, carried, observable, root_share
+from slam.tracker.uncertainty.covariances import carried, followed
 from slam.tracker.uncertainty.residuals import Evidence
 
 
@@ -105,28 +105,17 @@ class PoseCovariance:
 
         Without ``evidence`` the match was not used: odometry alone moved the robot.
         """
-        config, data = self._config, np.zeros((3, 3))
-        strength, new, written = 0.0, 0.0, np.zeros((3, 3))
+        config, elapsed = self._config, prediction.elapsed
+        strength, new, times = 0.0, 0.0, 0.0
         if evidence is not None:
-            self._learn(evidence, prediction.elapsed)
-            strength = match.tau * float(match.information[0, 0] + match.information[1, 1])
+            self._learn(evidence, elapsed)
+            (xx, _, _), (_, yy, _), _ = match.information.tolist()
+            strength = match.tau * (xx + yy)
             new = evidence.new / max(evidence.weighed, 1e-9)
-            xx, xy, yy = self._new_geometry
-            root_share((xx, xy, yy), self._geometry, config.written, written)
-            written[2, 2] = math.sqrt(min(config.written * new, 1.0))
-        if strength > 0.0 and self._weighed > config.forgotten:
-            feigned = self._feigned / self._weighed
-            geometry = self._geometry * (1.0 / self._weighed)
-            self.unobservable, along = observable(geometry, feigned, config.noisy, data)
-            self.along_rad = along if self.unobservable == 1 else None
-            data *= strength
-        else:
-            self.unobservable, self.along_rad = 2, None
-            self._blind = self._blind + self._shared
-        faded = math.exp(-prediction.elapsed / config.view_s)
-        self.unseen_s = (
-            self.unseen_s + prediction.elapsed if self.unobservable else self.unseen_s * faded
-        )
+            times = config.written
+        used = strength > 0.0 and self._weighed > config.forgotten
+        weight = 1.0 / self._weighed if used else 0.0
+        feigned = self._feigned / self._weighed if used else 0.0
         # the usual one where nothing was seen for so long that the sums are used up
         shared = max(self._products, 0.0) + config.forgotten * config.usual_m**2
         self.shared_m2 = shared / (self._pairs + config.forgotten)
@@ -134,24 +123,25 @@ class PoseCovariance:
         seen = self._in_view / max(self._looks, config.forgotten)
         fewer = max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
         variance = (self._lattice + config.shared_times**2 * self.shared_m2) * fewer
-        frames = max(1.0, config.correlated_s / max(prediction.elapsed, 1e-3))
-        advance(
-            self._drift,
-            self._blind,
-            self._shared,
-            self.newest_drift,
-            prediction.T_map_robot - T_map_before,
-            prediction.covariance,
-            data,
+        frames = max(1.0, config.correlated_s / max(elapsed, 1e-3))
+        a, b, d = self._new_geometry
+        self.covariance = np.empty((3, 3))
+        self.unobservable, along = followed(
+            self._drift, self._blind, self._shared, self.newest_drift,
+            T_map_before, prediction.T_map_robot, prediction.covariance, self._geometry,
+            (a, b, d, times, new),
+            (strength if used else 0.0, weight, feigned, config.noisy),
             (
                 variance * strength,
                 config.new_times**2 * new * variance * strength,
                 frames,
                 config.turn_times,
             ),
-            written,
-        )
-        self.covariance = self._drift + self._blind + self._shared
+            self.covariance,
+        )  # fmt: skip
+        self.along_rad = along if self.unobservable == 1 else None
+        faded = math.exp(-elapsed / config.view_s)
+        self.unseen_s = self.unseen_s + elapsed if self.unobservable else self.unseen_s * faded
 
     def dragged(self, covariance: Float, now: Float | None = None) -> None:
         """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot.
