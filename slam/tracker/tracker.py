@@ -15,7 +15,7 @@ from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Estimate
 from slam.frames import Float, Frame, Odometry
 from slam.frontend.observations import Observations, observe
-from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.frontend.odometry_prior import Prediction, turned
 from slam.path import PosePath
 from slam.tracker import map_file as memory
 from slam.tracker.belief.belief import Belief, Judged
@@ -320,9 +320,7 @@ class Tracker(abc.ABC):
 
     def matched(self, observations: Observations, T_map_robot: Float, covariance: Float) -> Match:
         """The match to the map as it is, from this pose on, off by as much as that."""
-        start = self._matcher.approach(self.cell_map, observations, T_map_robot, covariance)
-        precision = inverted(covariance)
-        return self._matcher.climb(self.cell_map, observations, start, T_map_robot, precision)
+        return self._matcher.matched(self.cell_map, observations, T_map_robot, covariance)
 
     def save(self, path: Path, extra: Mapping[str, NDArray[Any]] | None = None) -> None:
         """Write map, knobs and pose to a file for ``load``; raises ``OutputError``.

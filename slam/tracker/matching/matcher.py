@@ -9,73 +9,20 @@ from collections import deque
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from statistics import median
-from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
-from slam._jit import njit
 from slam.frames import Float
 from slam.frontend import odometry_prior
 from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.climb import SCRATCH, Climb, Numbers, climbed
 from slam.tracker.matching.config import UsualConfig
 from slam.tracker.matching.local_search import Around, SearchWindow, search
-from slam.tracker.matching.score import SCRATCH, Climb, Reward, Seen, refine
-
-
-class Widths(NamedTuple):
-    """Sums of two variances, m^2.
-
-    place  of the prior's position
-    least  a blur of no more is none
-    most   of the blur: it is shrunk to this
-    """
-
-    place: float
-    least: float
-    most: float
-
-
-@njit
-def blur(
-    seen: Seen, covariance: NDArray[np.float64], widths: Widths, every: int, out: Seen
-) -> bool:
-    """Fill ``out`` with one of ``every`` so many, smeared by a pose's (3, 3) ``covariance``.
-
-    That one is in the robot frame. False, and ``out`` is not to be used, where it smears none of
-    them by more than ``widths.least``.
-    """
-    xx, xy, xt = covariance[0, 0], covariance[0, 1], covariance[0, 2]
-    yy, yt, tt = covariance[1, 1], covariance[1, 2], covariance[2, 2]
-    farthest = 0.0
-    for k in range(len(seen.points)):
-        x, y = seen.points[k, 0], seen.points[k, 1]
-        farthest = max(farthest, x * x + y * y)
-    if 2.0 * (widths.place + farthest * tt) < widths.least:  # (a + b)^2 <= 2 (a^2 + b^2)
-        return False
-    blurred = False
-    for m in range(len(out.points)):
-        k = m * every
-        x, y = seen.points[k, 0], seen.points[k, 1]
-        ttx, tty = tt * x, tt * y
-        a = xx - 2.0 * xt * y + tty * y
-        b = xy + xt * x - yt * y - ttx * y
-        d = yy + 2.0 * yt * x + ttx * x
-        blurred |= a + d > widths.least
-        share = min(1.0, widths.most / max(a + d, 1e-12))
-        out.points[m, 0], out.points[m, 1] = x, y
-        out.covariances[m, 0] = seen.covariances[k, 0] + a * share
-        out.covariances[m, 1] = seen.covariances[k, 1] + b * share
-        out.covariances[m, 2] = seen.covariances[k, 2] + d * share
-        out.weights[m] = seen.weights[k] * every
-        out.tangents[m, 0], out.tangents[m, 1] = seen.tangents[k, 0], seen.tangents[k, 1]
-        out.facings[m], out.votes[m] = seen.facings[k], seen.votes[k]
-    return blurred
-
+from slam.tracker.matching.score import Reward, Seen
 
 LEAST = 1e-9  # shares are divided by the usual one
 
@@ -222,23 +169,38 @@ class Matcher:
         self.numbers = config.matching
         steps = self.numbers.climb
         self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
-        self._scratch = np.empty(SCRATCH)
+        cell = config.cell_m
+        numbers = Numbers(
+            tuple(self.reward),  # type: ignore[arg-type]  # plain, as its kernel says
+            tuple(self._climb),  # type: ignore[arg-type]
+            config.reward,
+            config.reward_exponent,
+            steps.tempered,
+            steps.least_weight,
+            (steps.moved_cells * cell) ** 2,
+            (steps.widest_cells * cell) ** 2,
+        )
+        self._plain = tuple(numbers)
+        n = steps.few
+        self._few = (
+            np.empty((n, 2)), np.empty((n, 3)), np.empty(n), np.empty((n, 2)),
+            np.empty(n, np.uint8), np.empty(n),
+        )  # fmt: skip
+        self._scratch = np.empty((SCRATCH[0] + 6, 3))
         self.usual = Usual(config.matching.usual)
         self._around = Around(self.reward.short_term)
 
     def match(self, observations: Observations, prediction: Prediction, cell_map: CellMap) -> Match:
         """Climb from the prediction; search around it when that is vague or finds too little."""
         predicted, prior = prediction.T_map_robot, prediction.prior
-        precision = inverted(prior)
-        start = self.approach(cell_map, observations, predicted, prior)
-        match = self.climb(cell_map, observations, start, predicted, precision)
+        match = self.matched(cell_map, observations, predicted, prior)
         local = self.numbers.local
         good = local.good_share * self.usual.match
         vague_m = local.vague_cells * self.config.cell_m  # as far as the climb reaches
         vague = math.sqrt(max(prior[0, 0], prior[1, 1])) > vague_m
         if not vague and match.matched >= good:
             return match
-        around = self._around.of(cell_map)
+        around, precision = self._around.of(cell_map), inverted(prior)
         for window in (SearchWindow.about(prior, local), SearchWindow.widest(local)):
             found = self.search(cell_map, observations, predicted, precision, window, around)
             if found.score > match.score:
@@ -246,6 +208,16 @@ class Matcher:
             if match.matched >= local.widest_share * good:
                 break
         return match
+
+    def matched(
+        self, cell_map: CellMap, observations: Observations, prediction: Float, covariance: Float
+    ) -> Match:
+        """The climb from where ``approach`` leads, with the prior that this has."""
+        every = math.ceil(len(observations.points_robot) / self.numbers.climb.few)
+        weight = observations.weight
+        return self._climbed(
+            cell_map, observations, weight, prediction, prediction, covariance, every
+        )
 
     def climb(
         self,
@@ -256,38 +228,8 @@ class Matcher:
         precision: Float,
     ) -> Match:
         """The local optimum reached from ``start``; the reward's weight falls with the match."""
-        seen = seen_by(observations)
-        full = observations.weight
-        pose = np.array(start, dtype=np.float64)
-        information = np.zeros((3, 3))
-        tau, matched, overlapped, score = self.config.reward, 0.0, 0.0, -math.inf
-        rewarded = 0.0
-        while full > 0.0:
-            rewarded, prior, count, absent = refine(
-                cell_map.cells,
-                self.reward,
-                self._climb,
-                seen,
-                pose,
-                prediction,
-                precision,
-                tau,
-                information,
-                self._scratch,
-            )
-            overlapped = count / full
-            matched = count / (full - absent) if count > 0.0 else 0.0
-            score = self.config.reward * rewarded + prior
-            tempered = self.config.reward * matched**self.config.reward_exponent
-            tempered = max(tempered, self.numbers.climb.least_weight)
-            if tau < self.config.reward or tempered > self.numbers.climb.tempered * tau:
-                break
-            tau = tempered
-        pose[2] = se2.wrap(float(pose[2]))
-        return Match(
-            T_map_robot=pose, information=information, matched=matched, score=score, tau=tau,
-            overlapped=overlapped, rewarded=rewarded / full if full > 0.0 else 0.0,
-        )  # fmt: skip
+        weight = observations.weight
+        return self._climbed(cell_map, observations, weight, start, prediction, precision, 0)
 
     def approach(
         self, cell_map: CellMap, observations: Observations, prediction: Float, covariance: Float
@@ -296,30 +238,34 @@ class Matcher:
 
         Returns the prediction itself where the prior moves no observation by half a cell.
         """
-        n = len(observations.points_robot)
-        if n == 0:
-            return prediction
-        numbers = self.numbers.climb
-        every = max(1, math.ceil(n / numbers.few))
-        m = -(-n // every)
-        few = Seen(
-            points=np.empty((m, 2)), covariances=np.empty((m, 3)), weights=np.empty(m),
-            tangents=np.empty((m, 2)), facings=np.empty(m, np.uint8), votes=np.empty(m),
+        every = math.ceil(len(observations.points_robot) / self.numbers.climb.few)
+        return self._climbed(
+            cell_map, observations, 0.0, prediction, prediction, covariance, every
+        ).T_map_robot
+
+    def _climbed(  # noqa: PLR0913 (arrays of one problem)
+        self,
+        cell_map: CellMap,
+        observations: Observations,
+        weight: float,
+        start: Float,
+        prediction: Float,
+        prior: Float,
+        every: int,
+    ) -> Match:
+        """As the kernel ``climbed``."""
+        cells, of = cell_map.cells, seen_by(observations)
+        pose, information = np.array(start, dtype=np.float64), np.empty((3, 3))
+        tau, matched, overlapped, score, rewarded = climbed(
+            cells.directory, cells.corner, cells.x, cells.y, cells.facing, self._plain,
+            of.points, of.covariances, of.weights, of.tangents, of.facings, of.votes, weight,
+            prediction, prior, every, self._few, pose, information, self._scratch,
         )  # fmt: skip
-        widths = Widths(
-            place=float(covariance[0, 0] + covariance[1, 1]),
-            least=(numbers.moved_cells * self.config.cell_m) ** 2,
-            most=(numbers.widest_cells * self.config.cell_m) ** 2,
-        )
-        in_robot = turned(covariance, -float(prediction[2]))
-        if not blur(seen_by(observations), in_robot, widths, every, few):
-            return prediction
-        pose = np.array(prediction, dtype=np.float64)
-        refine(
-            cell_map.cells, self.reward, self._climb, few, pose, prediction,
-            inverted(covariance), self.config.reward, np.zeros((3, 3)), self._scratch,
+        pose[2] = se2.wrap(float(pose[2]))
+        return Match(
+            T_map_robot=pose, information=information, matched=matched, score=score, tau=tau,
+            overlapped=overlapped, rewarded=rewarded / weight if weight > 0.0 else 0.0,
         )  # fmt: skip
-        return pose
 
     def search(
         self,

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How well observations overlap the map, Eq. (13), and the climb to the pose where they do most.
+"""How well observations overlap the map, Eq. (13).
 
 Sub-cell accuracy needs the overlap as a sum of Gaussians over the raw activities: interpolated or
 pre-blurred fields pull structure towards cell centres, and a map that is rewritten from its own
@@ -33,22 +33,6 @@ class Reward(NamedTuple):
     tail: float
     tail_cells: float
     young_trace: float
-
-
-SCRATCH = (13, 3)  # shape of the room that ``refine`` works in
-
-
-class Climb(NamedTuple):
-    """How the optimum is climbed to; fields as in ``ClimbConfig``."""
-
-    steps: int
-    enough: float
-    damping: float
-    damping_falls: float
-    damping_grows: float
-    damping_least: float
-    damping_again: float
-    damping_most: float
 
 
 class Seen(NamedTuple):
@@ -227,8 +211,23 @@ def _positive_part(a: float, b: float, d: float) -> tuple[float, float, float]:
 
 
 @uncounted
-def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
+def evaluate(  # noqa: PLR0913 (kernel)
     cells: Cells,
+    reward: Reward,
+    seen: Seen,
+    pose: NDArray[np.float64],
+    gradient: NDArray[np.float64],
+    along: NDArray[np.float64],
+    information: NDArray[np.float64],
+) -> tuple[float, float, float]:
+    """``evaluated`` on a map."""
+    field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
+    return evaluated(field, reward, seen, pose, gradient, along, information)
+
+
+@inner
+def evaluated(  # noqa: PLR0913, PLR0915 (kernel)
+    field: Field,
     reward: Reward,
     seen: Seen,
     pose: NDArray[np.float64],
@@ -248,7 +247,6 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     information[:] = 0.0
     score, matched, absent = 0.0, 0.0, 0.0
     scale = 1.0 / reward.cell
-    field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     # most observations have the covariance of the one before
     alike, bell = (1.0, 0.0, 1.0), _bell(1.0, 0.0, 1.0, reward.tail, reward.tail_cells)
@@ -298,99 +296,3 @@ def evaluate(  # noqa: PLR0913, PLR0915 (kernel)
     information[2, 0] = information[0, 2]
     information[2, 1] = information[1, 2]
     return score, matched, absent
-
-
-@inner
-def _prior(
-    pose: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    precision: NDArray[np.float64],
-    slope: NDArray[np.float64],
-) -> float:
-    """-1/2 e' P^-1 e with e = pose - prediction (heading wrapped); its gradient in ``slope``."""
-    ex, ey = pose[0] - prediction[0], pose[1] - prediction[1]
-    et = pose[2] - prediction[2]
-    et -= math.tau * math.floor(et / math.tau + 0.5)
-    for k in range(3):
-        slope[k] = -(precision[k, 0] * ex + precision[k, 1] * ey + precision[k, 2] * et)
-    return float(0.5 * (slope[0] * ex + slope[1] * ey + slope[2] * et))
-
-
-@inner
-def _solve(
-    H: NDArray[np.float64], g: NDArray[np.float64], damping: float, step: NDArray[np.float64]
-) -> None:
-    """(H + damping diag H) step = g for a positive definite 3 x 3 H, by Cholesky."""
-    grow = 1.0 + damping
-    l00 = math.sqrt(H[0, 0] * grow)
-    l10, l20 = H[1, 0] / l00, H[2, 0] / l00
-    l11 = math.sqrt(max(H[1, 1] * grow - l10 * l10, 1e-12))
-    l21 = (H[2, 1] - l20 * l10) / l11
-    l22 = math.sqrt(max(H[2, 2] * grow - l20 * l20 - l21 * l21, 1e-12))
-    a = g[0] / l00
-    b = (g[1] - l10 * a) / l11
-    c = (g[2] - l20 * a - l21 * b) / l22
-    step[2] = c / l22
-    step[1] = (b - l21 * step[2]) / l11
-    step[0] = (a - l10 * step[1] - l20 * step[2]) / l00
-
-
-@uncounted
-def refine(  # noqa: C901, PLR0913 (kernel)
-    cells: Cells,
-    reward: Reward,
-    climb: Climb,
-    seen: Seen,
-    pose: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    precision: NDArray[np.float64],
-    tau: float,
-    information: NDArray[np.float64],
-    scratch: NDArray[np.float64],
-) -> tuple[float, float, float, float]:
-    """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
-
-    Newton's method with Levenberg damping; a step is taken only if it rises, but for the last, tiny
-    one. The slope of the reward along observed surfaces is left out of it: there it only says where
-    the map is older, which would hold a robot back in a corridor. Returns reward, prior, the weight
-    of matched observations and that of unmatched ones without a vote, and leaves the data's
-    information (without tau and prior) in ``information``, all as before the last step. What is in
-    ``scratch`` (``SCRATCH``) does not matter.
-    """
-    gradient, along, slope, step = scratch[0], scratch[1], scratch[2], scratch[3]
-    trial, trial_gradient, trial_along = scratch[4], scratch[5], scratch[6]
-    trial_information, H = scratch[7:10], scratch[10:13]
-    rewarded, matched, absent = evaluate(cells, reward, seen, pose, gradient, along, information)
-    prior = _prior(pose, prediction, precision, slope)
-    damping = climb.damping
-    for _ in range(climb.steps):
-        for a in range(3):
-            for b in range(3):
-                H[a, b] = tau * information[a, b] + precision[a, b]
-            slope[a] += tau * (gradient[a] - along[a])
-        _solve(H, slope, damping, step)
-        if step[0] * slope[0] + step[1] * slope[1] + step[2] * slope[2] < climb.enough:
-            for a in range(3):
-                pose[a] += step[a]  # so little that it needs no look at the score
-            break
-        for a in range(3):
-            trial[a] = pose[a] + step[a]
-        trial_rewarded, trial_matched, trial_absent = evaluate(
-            cells, reward, seen, trial, trial_gradient, trial_along, trial_information,
-        )  # fmt: skip
-        older = along[0] * step[0] + along[1] * step[1] + along[2] * step[2]
-        trial_prior = _prior(trial, prediction, precision, step)
-        if tau * (trial_rewarded - rewarded - older) + trial_prior > prior:
-            rewarded, prior = trial_rewarded, trial_prior
-            matched, absent = trial_matched, trial_absent
-            for a in range(3):  # element by element: array assignment triples the compile time
-                pose[a], gradient[a], along[a] = trial[a], trial_gradient[a], trial_along[a]
-                for b in range(3):
-                    information[a, b] = trial_information[a, b]
-            damping = max(climb.damping_falls * damping, climb.damping_least)
-        else:
-            damping = max(climb.damping_grows * damping, climb.damping_again)
-            if damping > climb.damping_most:
-                break
-        _prior(pose, prediction, precision, slope)
-    return rewarded, prior, matched, absent

@@ -88,14 +88,12 @@ class Closures:
         key = self._keys[j]
         step, covariance = key.step, key.covariance
         cell_map = self._map_of(range(max(0, j - self._numbers.recent), j), j - 1)
-        start = self._matcher.approach(cell_map, key.observations, step, covariance)
-        precision = inverted(covariance)
-        match = self._matcher.climb(cell_map, key.observations, start, step, precision)
+        match = self._matcher.matched(cell_map, key.observations, step, covariance)
         self._spend_match(j)
         if match.matched >= self._numbers.good_step:
             step = match.T_map_robot
             information = self._information(cell_map, key.observations, match)
-            covariance = inverted(information + precision)
+            covariance = inverted(information + inverted(covariance))
         covariance = covariance + spread(self._numbers.chain_m, self._numbers.chain_rad)
         self.chained.append(se2.compose(self.chained[-1], step))
         return Edge(a=j - 1, b=j, T_a_b=step, information=inverted(covariance))
@@ -128,8 +126,7 @@ class Closures:
     def _matched(self, middle: int, j: int, predicted: Float) -> tuple[float, Match]:
         """The match nearest to a prediction, and its support."""
         cell_map, seen = self._submap(middle), self._keys[j].observations
-        start = self._matcher.approach(cell_map, seen, predicted, self._coarse)
-        match = self._matcher.climb(cell_map, seen, start, predicted, inverted(self._coarse))
+        match = self._matcher.matched(cell_map, seen, predicted, self._coarse)
         self._spend_match(j)
         self.spent += DRAWN
         return support(cell_map, seen, match), match
