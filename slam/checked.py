@@ -72,7 +72,8 @@ def finite(owner: str, name: str, array: NDArray[Any]) -> None:
 def pose(owner: str, name: str, value: ArrayLike) -> Float:
     """A frozen, finite ``(x, y, theta)``."""
     array = frozen(owner, name, value, (3,))
-    finite(owner, name, array)
+    if not math.isfinite(sum(array.tolist())):  # or their sum overflows
+        finite(owner, name, array)
     return array
 
 
@@ -83,7 +84,7 @@ def possible(
 
     By its correlations; variances of (30 micrometres or microradians)^2 count as rounding.
     """
-    x, y, t = (math.sqrt(variance + 1e-9) for variance in (xx, yy, tt))
+    x, y, t = math.sqrt(xx + 1e-9), math.sqrt(yy + 1e-9), math.sqrt(tt + 1e-9)
     a, b, c = xy / x / y, xt / x / t, yt / y / t
     within = max(abs(a), abs(b), abs(c)) <= 1.0 + 1e-6
     return within and 1.0 + 2.0 * a * b * c - a * a - b * b - c * c >= -1e-6
@@ -92,12 +93,15 @@ def possible(
 def covariance(owner: str, name: str, value: ArrayLike) -> Float:
     """A frozen, finite, symmetric, positive semidefinite (3, 3) covariance."""
     array = frozen(owner, name, value, (3, 3))
-    finite(owner, name, array)
-    rows = array.tolist()  # scalars: np.allclose on nine numbers costs more than a whole motion
-    (xx, xy, xt), (yx, yy, yt), (tx, ty, tt) = rows
-    equal = all(
-        abs(a - b) <= 1e-9 + 1e-6 * min(abs(a), abs(b)) for a, b in ((xy, yx), (xt, tx), (yt, ty))
-    )  # but for rounding
+    # scalars: np.allclose on nine numbers costs more than a whole motion
+    (xx, xy, xt), (yx, yy, yt), (tx, ty, tt) = array.tolist()
+    if not math.isfinite(xx + xy + xt + yx + yy + yt + tx + ty + tt):  # or their sum overflows
+        finite(owner, name, array)
+    equal = (  # but for rounding
+        abs(xy - yx) <= 1e-9 + 1e-6 * min(abs(xy), abs(yx))
+        and abs(xt - tx) <= 1e-9 + 1e-6 * min(abs(xt), abs(tx))
+        and abs(yt - ty) <= 1e-9 + 1e-6 * min(abs(yt), abs(ty))
+    )
     if min(xx, yy, tt) < 0.0 or not equal:
         raise InvalidValueError(
             f"{owner}.{name} must be symmetric with variances >= 0, got {array.tolist()}"

@@ -43,7 +43,7 @@ class PosePath:
         if reported is not None:
             self._reported[len(self._stamps)] = reported.copy()
         self._stamps.append(stamp_ns)
-        self._poses.extend(T_map_robot)
+        self._poses.extend(T_map_robot.tolist())
 
     def correct(self, poses: Float, T_new_old: Float, T_map_robot: Float) -> Float:
         """The map moved: the frames so far were at these (n, 3); the latest pose in it."""

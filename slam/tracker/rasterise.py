@@ -8,6 +8,7 @@ cell centres (pixel locking).
 
 import functools
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.surfaces import turned_face
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells
+from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, named
 from slam.tracker.map_config import MapConfig
 
 FINE = MapConfig().bell_steps
@@ -194,7 +195,7 @@ def _is_covered(cells: Cells, box: NDArray[np.float64], size: float) -> bool:
 
 @uncounted
 def _stamp(  # noqa: PLR0913 (kernel)
-    cells: Cells,
+    arrays: tuple[Any, ...],
     points_robot: NDArray[np.float64],
     covariances: NDArray[np.float64],
     joined: NDArray[np.bool_],
@@ -207,11 +208,12 @@ def _stamp(  # noqa: PLR0913 (kernel)
     points: NDArray[np.float64],
     box: NDArray[np.float64],
 ) -> int:
-    """Raise I around the points, seen from ``pose``, from ``start`` on.
+    """Raise I around the points, seen from ``pose``, from ``start`` on; ``arrays`` of ``Cells``.
 
     Returns the index of the point at which room ran out, n where it did not, and -1 where the
     directory does not cover the ``box`` (4,). ``points`` (n, 2) and that box are filled first.
     """
+    cells = named(arrays)
     if start == 0:
         _moved(points_robot, covariances, pose, cell, points, box)
         if not _is_covered(cells, box, SIDE * cell):
@@ -244,7 +246,7 @@ def rasterise(cell_map: CellMap, observations: Observations, T_map_robot: Float)
     done, ends = 0, cell_map.config.map.bell_ends
     while done < n:
         done = _stamp(
-            cell_map.cells,
+            tuple(cell_map.cells),
             observations.points_robot,
             observations.covariances,
             observations.joined,

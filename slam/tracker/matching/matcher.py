@@ -85,8 +85,10 @@ def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
 
 def near(match: Match, prediction: Prediction) -> Match:
     """The match, or odometry alone where rounding has carried it past all places and numbers."""
-    off = np.abs(match.T_map_robot - prediction.T_map_robot)
-    if off.max() <= odometry_prior.MOST_STEP_M and np.isfinite(match.information).all():
+    (x, y, turn), (x_0, y_0, turn_0) = match.T_map_robot.tolist(), prediction.T_map_robot.tolist()
+    off = abs(x - x_0), abs(y - y_0), abs(turn - turn_0)
+    numbers = sum(off) + sum(map(sum, match.information.tolist()))  # no number if one of them is
+    if math.isfinite(numbers) and max(off) <= odometry_prior.MOST_STEP_M:
         return match
     return unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
 

@@ -266,7 +266,7 @@ def votes(  # noqa: PLR0913 (kernel)
     before: NDArray[np.float64],
     counts: NDArray[np.int64],
     asked: tuple[int, float, float],
-    of: Asking,
+    plain: tuple[float, float, float, float, float, float, float, float],
     scratch: NDArray[np.float64],
     bins: NDArray[np.int64],
     out: NDArray[np.float64],
@@ -279,9 +279,13 @@ def votes(  # noqa: PLR0913 (kernel)
     lasers, limits, ages  of the scans asked, newest first, see ``_emptied``
     before  (J, w, 2) points in the map of each scan, of which it has ``counts`` (J,)
     asked   how many scans; s up to which they may have seen a place empty, and things left one
+    plain   numbers of ``Asking``
     scratch (6, at least n + 1, and points of any scan before), bins (2, bins): room to work in
     """
     n = len(points)
+    of = Asking(
+        plain[0], plain[1], plain[2], plain[3], plain[4], plain[5], plain[6], plain[7]
+    )  # as a named tuple it would take longer to get here
     stood, own, polar, first, last = scratch[0], scratch[1], scratch[2:], bins[0], bins[1]
     recent, lately = 0, 0  # the first ones: ages rise
     while recent < asked[0] and ages[recent] <= asked[1]:

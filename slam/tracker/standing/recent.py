@@ -4,7 +4,6 @@
 import math
 from bisect import bisect_right
 from dataclasses import dataclass, replace
-from operator import attrgetter
 
 import numpy as np
 
@@ -13,9 +12,7 @@ from slam.frames import NS_PER_S, Float
 from slam.frontend.observations import Observations
 from slam.tracker.standing.agreement import Agreement
 from slam.tracker.standing.config import StandingConfig
-from slam.tracker.standing.kernels import Asking, placed, votes
-
-_stamp_of = attrgetter("stamp_ns")
+from slam.tracker.standing.kernels import placed, votes
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -46,19 +43,22 @@ class _Asked:
         self.scratch, self.bins = np.empty((6, width + 1)), np.empty((2, bins), np.int64)
         self._held: list[Look | None] = [None] * most
 
-    def fits(self, bins: int, width: int) -> bool:
-        """Whether there is room for scans like that."""
-        return self.limits.shape[1] == bins and self.points.shape[1] >= width
-
-    def take(self, looks: list[Look], stamp_ns: int) -> None:
-        """Hold these, as they are at that time."""
+    def take(self, looks: list[Look], least: int, stamp_ns: int) -> bool:
+        """Hold these, as they are at that time; False where there is no room for them, or for a
+        present one of ``least`` points."""
+        most, bins, held = self.points.shape[1], self.limits.shape[1], self._held
+        if least > most:
+            return False
         for k, look in enumerate(looks):
             self.ages_s[k] = (stamp_ns - look.stamp_ns) / NS_PER_S
-            if self._held[k] is not look:
+            if held[k] is not look:
+                n = len(look.points_map)
+                if n > most or len(look.limit) != bins:
+                    return False
                 self.lasers[k], self.limits[k] = look.T_map_laser, look.limit
-                n = self.counts[k] = len(look.points_map)
-                self.points[k, :n] = look.points_map
-                self._held[k] = look
+                self.points[k, :n], self.counts[k] = look.points_map, n
+                held[k] = look
+        return True
 
 
 class Standing:
@@ -70,6 +70,7 @@ class Standing:
     def __init__(self, config: StandingConfig) -> None:
         self._config, self.agreement = config, Agreement(config)
         self._looks: list[Look] = []
+        self._stamps_ns: list[int] = []  # theirs
         # a little less, as scans come when they come
         first_s = 0.95 * config.spacing_s
         ages_s = [first_s * config.ages_grow**k for k in range(config.views)]
@@ -84,6 +85,7 @@ class Standing:
         looks, config = self._looks, self._config
         if len(looks) > 1 and stamp_ns - looks[-2].stamp_ns < config.spacing_s * NS_PER_S:
             looks.pop()  # the newest is always there
+            self._stamps_ns.pop()
         points_map = np.empty(seen.points_robot.shape)
         placed(seen.points_robot, T_map_robot, points_map)
         looks.append(
@@ -95,9 +97,10 @@ class Standing:
                 step=seen.view.step,
             )
         )
+        self._stamps_ns.append(stamp_ns)
         oldest = stamp_ns - self._oldest_ns
         while looks[0].stamp_ns < oldest:
-            del looks[0]
+            del looks[0], self._stamps_ns[0]
 
     def moved(self, T_new_old: Float) -> None:
         """The map moved: so did what was seen in it."""
@@ -125,7 +128,7 @@ class Standing:
             older = bisect_right(self._ages_ns, age)
             if older == len(self._ages_ns):
                 break
-            k = bisect_right(looks, stamp_ns - self._ages_ns[older], 0, k - 1, key=_stamp_of)
+            k = bisect_right(self._stamps_ns, stamp_ns - self._ages_ns[older], 0, k - 1)
         return chosen
 
     def with_votes(
@@ -140,25 +143,22 @@ class Standing:
         if not asked or not len(points):
             return seen.with_votes(np.ones(len(points)))
         place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])
-        margin = config.margin_m + config.sigmas * math.sqrt(place)
         spread = math.radians(config.spread_deg) + config.sigmas * math.sqrt(heading)
-        asking = Asking(
-            step=seen.view.step,
-            margin=margin,
-            spread=min(spread, 0.5 * math.pi),
-            # else the prediction may be what is off
-            sure=1.0 / (1.0 + place / config.vague_m**2),
-            settled_s=config.settled_s,
-            left_m=config.left_m,
-            along_m=config.along_m,
-            thin_m=config.thin_m,
+        asking = (
+            seen.view.step,
+            config.margin_m + config.sigmas * math.sqrt(place),
+            min(spread, 0.5 * math.pi),
+            1.0 / (1.0 + place / config.vague_m**2),  # else the prediction may be what is off
+            config.settled_s,
+            config.left_m,
+            config.along_m,
+            config.thin_m,
         )
-        bins, width = len(seen.view.limit), max(len(look.points_map) for look in asked)
+        if not self._room.take(asked, len(points), stamp_ns):
+            width = 2 * max(len(points), *[len(look.points_map) for look in asked])
+            self._room = _Asked(len(self._ages_ns) + 1, len(seen.view.limit), width)
+            self._room.take(asked, len(points), stamp_ns)
         room = self._room
-        if not room.fits(bins, max(width, len(points))):
-            most = len(self._ages_ns) + 1
-            room = self._room = _Asked(most, bins, 2 * max(width, len(points)))
-        room.take(asked, stamp_ns)
         out = np.empty(len(points))
         in_view = votes(
             points, seen.joined, seen.view.limit, T_map_robot,

@@ -12,20 +12,23 @@ whose noise alone would make a smooth corridor look rough.
 
 import math
 from dataclasses import dataclass
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, njit
+from slam._jit import inner, uncounted
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import MASK, SHIFT, Cells
+from slam.tracker.cells import MASK, SHIFT, Cells, named
 
 # places in the sums of ``_look``
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
 OLD_S = 8.0  # s for which a surface was looked at, at which it counts half as old; set by hand
+
+
+NO_VOTES = np.empty(0)
 
 
 class Pairing(NamedTuple):
@@ -166,18 +169,21 @@ def _free_standing(
     return True
 
 
-@njit
+@uncounted
 def _look(  # noqa: PLR0913, PLR0915 (kernel)
-    cells: Cells, short_term: float, cell: float,
+    arrays: tuple[Any, ...], short_term: float, cell: float,
     points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
-    joined: NDArray[np.bool_], laser: NDArray[np.float64], pose: NDArray[np.float64],
-    start: int, step: int, times: tuple[float, float, float], pairing: Pairing,
+    votes: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
+    pose: NDArray[np.float64], start: int, step: int, times: tuple[float, float, float],
+    numbers: tuple[float, float, float, float, float], off: NDArray[np.float64],
     geometry: NDArray[np.float64], sums: NDArray[np.float64], old: NDArray[np.float64],
 ) -> None:  # fmt: skip
     """Add up what ``Evidence`` holds; ``times``: s of one look, of a trace's prior age, and
-    since all directions of position were seen."""
+    since all directions of position were seen. ``arrays`` of ``Cells``, ``numbers`` of ``Pairing``;
+    no ``votes``: all have one. ``off`` (2,): room to work in."""
+    cells = named(arrays)
+    pairing = Pairing(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
     c, s = math.cos(pose[2]), math.sin(pose[2])
-    off = np.empty(2)
     surfaces = False
     for k in range(len(joined)):
         surfaces = surfaces or joined[k]
@@ -190,7 +196,8 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         k = _partner(points, joined, laser, first, pairing)
         if k < 0 and surfaces and not _free_standing(points, joined, laser, first):
             continue
-        w = weights[first]
+        # what moves says nothing of how far the map is off, nor is it new map
+        w = weights[first] * votes[first] if len(votes) > 0 else weights[first]
         sums[WEIGHED] += w
         age = _age(cells, u, v) + times[0] + times[1]
         sums[NEW] += w * times[0] / age
@@ -229,6 +236,8 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         old[5] += o * h
     geometry[1, 0], geometry[2, 0] = geometry[0, 1], geometry[0, 2]
     geometry[2, 1] = geometry[1, 2]
+    for k in range(6):
+        old[k] *= step  # of all points in view
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -276,22 +285,20 @@ def look(
     """
     config, cell = cell_map.config.uncertainty.residuals, cell_map.cell
     step = max(1, len(seen.points_robot) // config.samples)
-    pairing = Pairing(
-        apart=config.apart_cells * cell,
-        longest=config.longest_cells * cell,
-        faint_overlap=config.faint_overlap,
-        bent=config.bent,
-        sensor_sigma=seen.sensor_sigma_m,
+    pairing = (
+        config.apart_cells * cell,
+        config.longest_cells * cell,
+        config.faint_overlap,
+        config.bent,
+        seen.sensor_sigma_m,
     )
     geometry, sums, old = np.zeros((3, 3)), np.zeros(8), np.zeros(6)
     elapsed, since_s = times
-    # what moves says nothing of how far the map is off, nor is it new map
-    weights = seen.weights if seen.votes is None else seen.weights * seen.votes
     _look(
-        cell_map.cells, short_term, cell_map.cell,
-        seen.points_robot, seen.covariances, weights, seen.joined, seen.T_robot_laser,
+        tuple(cell_map.cells), short_term, cell, seen.points_robot, seen.covariances, seen.weights,
+        NO_VOTES if seen.votes is None else seen.votes, seen.joined, seen.T_robot_laser,
         T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed), since_s), pairing,
-        geometry, sums, old,
+        np.empty(2), geometry, sums, old,
     )  # fmt: skip
     shared, paired, feigned, new, weighed = sums[:NEW_XX].tolist()
     return Evidence(
@@ -303,5 +310,5 @@ def look(
         feigned=feigned,
         new=new,
         new_geometry=sums[NEW_XX:],
-        old=old * step,
+        old=old,
     )

@@ -194,7 +194,7 @@ def test_scans_of_any_size_and_a_map_that_moved_are_asked_alike() -> None:
         by = np.array([0.1 * k, 0.0, 0.0])
         going_on.moved(by)
         fresh = Standing(NUMBERS)
-        fresh._looks = list(going_on._looks)
+        fresh._looks, fresh._stamps_ns = list(going_on._looks), list(going_on._stamps_ns)
         a, b = (s.with_votes(NS_PER_S, by, SURE, scan).votes for s in (going_on, fresh))
         assert a is not None
         np.testing.assert_array_equal(a, b)
