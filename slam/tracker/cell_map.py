@@ -8,25 +8,25 @@ pooled in blocks of 8 x 8; a directory maps a block's place to its slot in the p
 import abc
 import copy
 import math
-from typing import Self
+from typing import Any, Self
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import uncounted
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frontend.visibility import View
 from slam.tracker.cells import (
     ANEW,
     FIRST,
-    FREE_COUNT,
     SIDE,
-    TOUCHED_COUNT,
     Cells,
     Look,
     living,
+    named,
     no_cells,
+    released,
     used,
     with_room,
 )  # fmt: skip
@@ -38,24 +38,9 @@ MAX_DIRECTORY = 1 << 26  # entries, 256 MiB: 1.9 km square
 MAX_CELLS = 1 << 26  # of a raster, 256 MiB: 245 m square at 3 cm; a larger map has wider cells
 
 
-@njit
-def _release(cells: Cells) -> None:
-    """Release the scratch of the present impressions; blocks that never came to life die."""
-    for k in range(cells.counts[TOUCHED_COUNT]):
-        slot, born = cells.touched[k, 0], cells.touched[k, 3]
-        cells.scratch_of[slot] = -1
-        row, column = cells.touched[k, 2] - cells.corner[1], cells.touched[k, 1] - cells.corner[0]
-        if born == 0 or cells.directory[row, column] != slot:
-            continue  # what died in the update is free already
-        alive = False
-        for j in range(SIDE):
-            for i in range(SIDE):
-                alive |= cells.x[slot, j, i] != 0.0 or cells.age[slot, j, i] != 0.0
-        if not alive:
-            cells.directory[row, column] = -1
-            cells.free[cells.counts[FREE_COUNT]] = slot
-            cells.counts[FREE_COUNT] += 1
-    cells.counts[TOUCHED_COUNT] = 0
+@uncounted
+def _release(arrays: tuple[Any, ...]) -> None:
+    released(named(arrays))
 
 
 class CellMap(abc.ABC):
@@ -125,7 +110,7 @@ class CellMap(abc.ABC):
 
     def release(self) -> None:
         """Forget the present impressions, and the blocks that were born under them in vain."""
-        _release(self.cells)
+        _release(tuple(self.cells))
 
     def kept(self, slots: NDArray[np.int32]) -> NDArray[np.float32]:
         """(n, 8, 8) what a file keeps as ``age``."""

@@ -201,3 +201,23 @@ def in_reach(
         max(0, column0 - cells.corner[0]),
         min(columns, column1 - cells.corner[0]),
     )
+
+
+@inner
+def released(cells: Cells) -> None:
+    """Release the scratch of the present impressions; blocks that never came to life die."""
+    for k in range(cells.counts[TOUCHED_COUNT]):
+        slot, born = cells.touched[k, 0], cells.touched[k, 3]
+        cells.scratch_of[slot] = -1
+        row, column = cells.touched[k, 2] - cells.corner[1], cells.touched[k, 1] - cells.corner[0]
+        if born == 0 or cells.directory[row, column] != slot:
+            continue  # what died in the update is free already
+        alive = False
+        for j in range(SIDE):
+            for i in range(SIDE):
+                alive |= cells.x[slot, j, i] != 0.0 or cells.age[slot, j, i] != 0.0
+        if not alive:
+            cells.directory[row, column] = -1
+            cells.free[cells.counts[FREE_COUNT]] = slot
+            cells.counts[FREE_COUNT] += 1
+    cells.counts[TOUCHED_COUNT] = 0

@@ -7,7 +7,7 @@ neurons are born under an observation and die when every neuron in them is silen
 """
 
 import math
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 from numpy.typing import NDArray
@@ -26,6 +26,8 @@ from slam.tracker.cells import (
     Look,
     fresh,
     in_reach,
+    named,
+    released,
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
 
@@ -78,19 +80,23 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
 
 @uncounted
 def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
-    cells: Cells,
-    view: View,
+    arrays: tuple[Any, ...],
+    plain_view: tuple[Any, ...],
     T_map_laser: NDArray[np.float64],
     cell: float,
-    law: Law,
+    numbers: tuple[Any, ...],
     write: bool,
     counted: NDArray[np.uint8],
 ) -> Look:
     """One semi-implicit Gauss-Seidel sweep of Eq. (8) over the neurons in view.
 
     ``write`` False only looks. Impressions are consumed (their scratch is released) when written.
-    ``counted``: see ``cells.Look``.
+    ``counted``: see ``cells.Look``. ``arrays`` of ``Cells``, ``View`` and the ``numbers`` of a
+    ``Law`` as plain tuples: those get here sooner.
     """
+    cells, v, n = named(arrays), plain_view, numbers
+    view = View(v[0], v[1], v[2], v[3], v[4], v[5])
+    law = Law(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10])
     confirmed, contradicted, visited = 0.0, 0.0, 0
     known, through = 0.0, 0.0
     once = counted.shape[1] > 0
@@ -166,6 +172,8 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                 cells.directory[row, column] = -1
                 cells.free[cells.counts[FREE_COUNT]] = slot
                 cells.counts[FREE_COUNT] += 1
+    if write:
+        released(cells)
     return Look(confirmed, contradicted, visited, known * cell, through * cell)
 
 
@@ -191,23 +199,21 @@ class Network(CellMap):
     ) -> Look:
         """Take the present impressions in for ``step`` s; see the kernel of the same name."""
         numbers, pace = self.config.map, self.pace(step)
-        law = Law(
-            step=step,
-            pace=pace,
-            oldest=numbers.oldest_paces * pace,
-            decay=self.config.decay_per_s,
-            threshold=self.config.threshold,
-            mu=self.mu,
-            reach=self.config.lateral_reach_cells,
-            trace=self.config.trace_s > 0.0,
-            faded=numbers.faded,
-            unseen=numbers.unseen,
-            known_s=numbers.known_s,
+        law = (
+            step,
+            pace,
+            numbers.oldest_paces * pace,
+            self.config.decay_per_s,
+            self.config.threshold,
+            self.mu,
+            self.config.lateral_reach_cells,
+            self.config.trace_s > 0.0,
+            numbers.faded,
+            numbers.unseen,
+            numbers.known_s,
         )
-        result = integrate(self.cells, view, T_map_laser, self.cell, law, write, counted)
-        if write:
-            self.release()
-        return result
+        arrays = tuple(self.cells)
+        return integrate(arrays, tuple(view), T_map_laser, self.cell, law, write, counted)
 
 
 def lateral_mu(total: float, reach: float) -> float:
