@@ -1,10 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where the robot should be by its odometry, how sure of that one may be, and its heading bias.
-
-Wheels of unequal size turn a robot that drives straight, a wrong track miscounts its turns
-(UMBmark, Borenstein and Feng 1996), both for a whole run. That bias is learnt while the map shows
-the heading; left in, it leads a robot astray as soon as the map shows little.
-"""
+"""Where the robot should be by its odometry, and how sure of that one may be."""
 
 import math
 from dataclasses import dataclass, field
@@ -17,7 +12,8 @@ from slam import se2
 from slam._jit import inner, uncounted
 from slam.errors import InvalidValueError
 from slam.frames import MOST_TWIST, Float, Odometry
-from slam.frontend.config import FRONTEND, BiasConfig
+from slam.frontend.heading_bias import HeadingBias
+from slam.frontend.motions import chained
 
 # From frame to frame.
 MOST_STEP_M = 1000.0  # between two frames: farther, the stream is broken or of another run
@@ -26,13 +22,6 @@ MOST_STD = 1e4  # m and rad, of an increment; with more, rounding would eat what
 HUGE = 1.0  # m^2 or rad^2: from there on,
 MOST_CORRELATION = 1.0 - 1e-6  # exact correlations would leave nothing of what is known beside
 LEAST_SHARE = 1e-12  # of the larger variance of position that the smaller one must have
-# The heading bias; set by hand.
-LASTS_S = 1000.0  # s in which a robot's bias may change by 1 sigma
-INDEPENDENT = 0.3  # share of a match's information, from frame to frame
-DATA_SHARE = 0.5  # least share of the data in a match's heading
-MATCHED = 0.3  # least matched share of observations
-OUTLIER = 9.0  # squared innovation, in variances, above which a match is left out: 3 sigma
-PLACE_INFORMATION = 1e-3  # 1/m^2, of the position where it is unknown: 30 m
 # The prior; set by hand.
 FLOOR_M, FLOOR_RAD = 0.002, 0.0015  # least deviation after FLOOR_S; grows with the root of time
 FLOOR_S, FLOOR_MOST_S = 0.2, 1.0  # s; the floors grow no further than over the latter
@@ -42,67 +31,6 @@ LEAST_M, LEAST_RAD = 0.004, 0.003  # least deviation for the matcher, after FLOO
 ASSUMED_SHARE, ASSUMED_TURN_M, ASSUMED_RAD_PER_SQRT_M, ASSUMED_TURN = 0.10, 0.10, 0.08, 0.15
 LEAST_VARIANCE = 1e-12  # m^2 and rad^2, added so that none is zero: (1 um)^2, (1 urad)^2
 TWIST_S = 0.5  # s, longest odometry step that gives a twist
-
-
-class HeadingBias:
-    """A Kalman filter of three: the heading's error against the map, and the two biases.
-
-    Each match gives it what the data alone say of the heading. It learns nothing where they say
-    nothing, so it needs no gate against featureless places.
-
-    per_m, per_rad  what the odometry adds, rad for each m driven and each rad turned
-    """
-
-    def __init__(self, config: BiasConfig = FRONTEND.bias) -> None:
-        self._config = config
-        self.per_m, self.per_rad = 0.0, 0.0
-        self._P = [[0.0] * 3, [0.0, config.per_m**2, 0.0], [0.0, 0.0, config.per_rad**2]]
-
-    def corrected(self, increment: Float) -> Float:
-        """The increment (3,) without the biases."""
-        x, y, turn = increment.tolist()
-        return np.array([x, y, turn * (1.0 - self.per_rad) - x * self.per_m])
-
-    def learn(
-        self,
-        increment: Float,
-        elapsed: float,
-        variances: tuple[float, float],
-        matched: tuple[float, float, Float],
-    ) -> None:
-        """Take in one match.
-
-        increment  (3,) corrected motion of ``elapsed`` s that led to the prediction
-        variances  rad^2 of its heading: by odometry, and as the matcher was given it
-        matched    share of the observations matched, the heading found minus the predicted one
-                   (rad), and the data's information (3, 3) by (x, y, theta) at their full weight
-        """
-        (said, given), (share, off, information) = variances, matched
-        P, G = self._P, (1.0, float(increment[0]), float(increment[2]))
-        row = [G[0] * P[0][k] + G[1] * P[1][k] + G[2] * P[2][k] for k in range(3)]
-        P[0] = [row[0] * G[0] + row[1] * G[1] + row[2] * G[2] + said, row[1], row[2]]
-        P[1][0], P[2][0] = row[1], row[2]
-        P[1][1] += self._config.per_m**2 * elapsed / LASTS_S
-        P[2][2] += self._config.per_rad**2 * elapsed / LASTS_S
-        found = _of_heading(information)
-        kept = found * given / (1.0 + found * given)  # of what the data say, beside the prior
-        if share < MATCHED or kept < DATA_SHARE:
-            return
-        innovation, S = se2.wrap(off) / kept, P[0][0] + 1.0 / (INDEPENDENT * found)
-        if innovation * innovation > OUTLIER * S:
-            return
-        K = [P[j][0] / S for j in range(3)]
-        self.per_m -= K[1] * innovation
-        self.per_rad -= K[2] * innovation
-        self._P = [[P[j][k] - K[j] * P[0][k] for k in range(3)] for j in range(3)]
-
-
-def _of_heading(information: Float) -> float:
-    """Information on the heading that is left with the place unknown, 1/rad^2."""
-    (a, b, e), (_, d, f), (_, _, h) = information.tolist()
-    a, d = a + PLACE_INFORMATION, d + PLACE_INFORMATION
-    left: float = h - (d * e * e - 2.0 * b * e * f + a * f * f) / max(a * d - b * b, 1e-9)
-    return max(left, 0.0)
 
 
 Pair = tuple[float, float]
@@ -271,8 +199,8 @@ def invertible(covariance: Float) -> Float:
     return out
 
 
-def motion(before: Odometry, now: Odometry) -> Float:
-    """(3,) ``T_before_now``. Raises ``InvalidValueError`` for a step that no robot makes."""
+def check_step(before: Odometry, now: Odometry) -> None:
+    """Raise ``InvalidValueError`` for a step that no robot makes."""
     x, y, turn = before.T_odom_robot.tolist()
     x_now, y_now, turn_now = now.T_odom_robot.tolist()
     distance = math.hypot(x_now - x, y_now - y)
@@ -290,6 +218,11 @@ def motion(before: Odometry, now: Odometry) -> Float:
                 f"Odometry.T_odom_robot must lie within {MOST_POSE:g} m and rad, got {farthest:g} "
                 f"at {stamp_ns} ns"
             )
+
+
+def motion(before: Odometry, now: Odometry) -> Float:
+    """(3,) ``T_before_now``. Raises ``InvalidValueError`` for a step that no robot makes."""
+    check_step(before, now)
     return se2.between(before.T_odom_robot, now.T_odom_robot)
 
 
@@ -353,9 +286,10 @@ def predict(
     ``scales`` multiply its variance of translation and of rotation; ``bias`` is taken out of the
     increment. With wheels that slip the increment may be off by ``slip`` (3, 3) more.
     """
-    increment = motion(before, now)
-    if bias is not None:
-        increment = bias.corrected(increment)
+    check_step(before, now)
+    increment, T_map_robot = np.empty(3), np.empty(3)
+    biases = (0.0, 0.0) if bias is None else (bias.per_m, bias.per_rad)
+    chained(before.T_odom_robot, now.T_odom_robot, T_map_before, biases, increment, T_map_robot)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given, (along, turning) = now.increment_covariance, scales
     unscaled = assumed_covariance(increment) if given is None else invertible(given)
@@ -374,7 +308,7 @@ def predict(
         slip, np.empty((3, 3)), covariance, loosened,
     )  # fmt: skip
     return Prediction(
-        T_map_robot=se2.compose(T_map_before, increment),
+        T_map_robot=T_map_robot,
         increment=increment,
         covariance=covariance,
         unscaled=unscaled,

@@ -16,6 +16,8 @@ import numpy as np
 
 from slam._jit import announced
 from slam.frames import NS_PER_S, LaserSpec, Odometry, Scan
+from slam.frontend.heading_bias import HeadingBias
+from slam.frontend.motions import extended
 from slam.frontend.observations import Observations, from_scan
 from slam.frontend.odometry_prior import inverted, predict, squared
 from slam.posegraph import Edge, optimise
@@ -67,6 +69,8 @@ def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None
     ]
     prior = predict(origin, still[0], still[1]).covariance
     squared(origin, prior)
+    HeadingBias().learn(origin, 1.0, (1.0, 1.0), (1.0, 0.0, prior))
+    extended(np.zeros(3), np.eye(3), origin, prior)
     compared(prior, prior, prior, prior, 0.0, prior, origin, 1.0, (0.0, 0.0))
     for one in (cell_map, *others):
         for write in (False, True):

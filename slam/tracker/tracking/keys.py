@@ -8,6 +8,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
+from slam.frontend.motions import extended
 from slam.frontend.observations import Observations
 from slam.tracker.belief.places import spread
 from slam.tracker.tracking.config import LoopsConfig
@@ -75,8 +76,7 @@ class KeyFrames:
         was lost before it, and found in the map.
         """
         self._found |= found
-        self._covariance = se2.propagate(self._covariance, self._step, motion, covariance)
-        self._step = se2.compose(self._step, motion)
+        extended(self._step, self._covariance, motion, covariance)
         self.way_m += math.hypot(float(motion[0]), float(motion[1]))
         self.elapsed_s += elapsed
         moved = math.hypot(float(self._step[0]), float(self._step[1]))

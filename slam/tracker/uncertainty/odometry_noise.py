@@ -17,8 +17,8 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, njit
 from slam.frames import Float, Odometry
+from slam.frontend.heading_bias import HeadingBias
 from slam.frontend.odometry_prior import (
-    HeadingBias,
     Prediction,
     inverse,
     predict,

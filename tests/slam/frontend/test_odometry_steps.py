@@ -14,7 +14,8 @@ from slam import LaserSpec, create, se2
 from slam.errors import InvalidValueError
 from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import NS_PER_S, Features, Frame, Odometry
-from slam.frontend.odometry_prior import HeadingBias, Prediction, motion
+from slam.frontend.heading_bias import HeadingBias
+from slam.frontend.odometry_prior import Prediction, motion
 from slam.frontend.odometry_steps import MotionSum
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
@@ -174,7 +175,8 @@ def drive(
         true = np.array([0.15, 0.0, 0.2 * math.sin(0.05 * k)])
         added = true[2] * per_rad + 0.15 * per_m + float(rng.normal(0.0, noise))
         odometry = true + np.array([0.0, 0.0, added])
-        increment = bias.corrected(odometry)
+        turn = odometry[2] * (1.0 - bias.per_rad) - odometry[0] * bias.per_m
+        increment = np.array([odometry[0], odometry[1], turn])
         error += increment[2] - true[2]
         told, given = information[2, 2], SAID**2
         off = -error * told * given / (1.0 + told * given)
