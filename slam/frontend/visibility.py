@@ -138,10 +138,13 @@ def _beside(view: View, turns: float, r: float) -> float:
 
 
 @inner
-def seen_empty(view: View, dx: float, dy: float) -> bool:
-    """True where a beam passed by (dx, dy) (m, from the laser, laser axes) without stopping."""
+def seen_empty(view: View, dx: float, dy: float, free: float) -> bool:
+    """True where a beam passed by (dx, dy) (m, from the laser, laser axes) without stopping.
+
+    ``free``: m, no beam near there went farther, see ``free_around``.
+    """
     r = math.sqrt(dx * dx + dy * dy)
-    if r >= view.farthest - view.margin:
+    if r >= free - view.margin:
         return False
     turns = bearing(dx, dy) / view.step
     if abs(turns - math.floor(turns + 0.5)) < 0.5 - BEARING_OFF / view.step:
@@ -152,23 +155,24 @@ def seen_empty(view: View, dx: float, dy: float) -> bool:
 
 
 @inner
-def block_is_hidden(view: View, dx: float, dy: float, half: float) -> bool:
-    """True when no neuron within ``half`` m of (dx, dy) can be in view."""
+def free_around(view: View, dx: float, dy: float, half: float) -> float:
+    """Longest free range (m) in the bins of what is within ``half`` m of (dx, dy): none of it can
+    be in view where that is no longer than the way to there. 0 where no beam comes so far.
+    """
     r = math.sqrt(dx * dx + dy * dy)
     if r - half >= view.farthest:
-        return True
-    if r <= 2.0 * half:
-        return False
+        return 0.0
     bins = len(view.limit)
-    k = bin_of(dx, dy, view.step, 0.5)
-    spread = int(half / r / view.step * 1.1) + 2
+    spread = bins
+    if r > 2.0 * half:
+        spread = int(half / r / view.step * 1.1) + 2
     if 2 * spread + 1 >= bins:
-        return False
-    m = k - spread
+        return view.farthest
+    m = bin_of(dx, dy, view.step, 0.5) - spread
     if m < 0:
         m += bins
+    longest = 0.0
     for _ in range(2 * spread + 1):
-        if view.limit[m] > r - half:
-            return False
+        longest = max(longest, view.limit[m])
         m = m + 1 if m + 1 < bins else 0
-    return True
+    return longest

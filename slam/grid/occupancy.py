@@ -15,7 +15,7 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.frames import Float
-from slam.frontend.visibility import View, block_is_hidden, seen_empty
+from slam.frontend.visibility import View, free_around, seen_empty
 from slam.settings import Settings, number
 from slam.system import Raster, register
 from slam.tracker.cell_map import CellMap
@@ -83,7 +83,8 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
                 continue
             bx = (column + cells.corner[0] + 0.5) * size - ox
             by = (row + cells.corner[1] + 0.5) * size - oy
-            if block_is_hidden(view, c * bx + s * by, c * by - s * bx, 0.71 * size):
+            dx, dy, half = c * bx + s * by, c * by - s * bx, 0.71 * size
+            if free_around(view, dx, dy, half) <= math.sqrt(dx * dx + dy * dy) - half:
                 continue
             if cells.counts[FREE_COUNT] == 0:
                 return False
@@ -124,7 +125,9 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
             scratch = cells.scratch_of[slot]
             i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
             bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
-            if scratch < 0 and block_is_hidden(view, c * bx + s * by, c * by - s * bx, half):
+            dx, dy = c * bx + s * by, c * by - s * bx
+            free = free_around(view, dx, dy, half)
+            if scratch < 0 and free <= math.sqrt(dx * dx + dy * dy) - half:
                 continue
             for jj in range(SIDE):
                 for ii in range(SIDE):
@@ -134,7 +137,7 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
                     if given == 0.0:
                         px = (i0 + ii + 0.5) * cell - ox
                         py = (j0 + jj + 0.5) * cell - oy
-                        if not seen_empty(view, c * px + s * py, c * py - s * px):
+                        if not seen_empty(view, c * px + s * py, c * py - s * px, free):
                             continue
                         contradicted += y
                         through += fresh(counted, once, 1, slot, jj, ii, weight)

@@ -14,7 +14,7 @@ from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
 from slam.frontend.surfaces import opposite
-from slam.frontend.visibility import View, block_is_hidden, seen_empty
+from slam.frontend.visibility import View, free_around, seen_empty
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
     ANEW,
@@ -113,7 +113,9 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
             scratch = cells.scratch_of[slot]
             i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
             bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
-            if scratch < 0 and block_is_hidden(view, c * bx + s * by, c * by - s * bx, half):
+            dx, dy = c * bx + s * by, c * by - s * bx
+            free = free_around(view, dx, dy, half)
+            if scratch < 0 and free <= math.sqrt(dx * dx + dy * dy) - half:
                 continue
             alive = False
             for jj in range(SIDE):
@@ -130,7 +132,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                     if given == 0.0:
                         px = (i0 + ii + 0.5) * cell - ox
                         py = (j0 + jj + 0.5) * cell - oy
-                        if not seen_empty(view, c * px + s * py, c * py - s * px):
+                        if not seen_empty(view, c * px + s * py, c * py - s * px, free):
                             alive = True
                             continue
                         contradicted += y

@@ -3,6 +3,7 @@
 
 import math
 
+import numba
 import numpy as np
 import pytest
 from numpy.typing import NDArray
@@ -10,7 +11,7 @@ from numpy.typing import NDArray
 from slam import se2
 from slam.frames import Features, Scan
 from slam.frontend.observations import Observations, from_features, from_scan
-from slam.frontend.visibility import SILENT_M, View
+from slam.frontend.visibility import SILENT_M, View, free_around, view_of_beams
 from slam.shunting.slam import ShuntingConfig
 from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
@@ -19,6 +20,11 @@ from tests.world2d import World2D, laser, rectangle
 Array = NDArray[np.float64]
 CONFIG = ShuntingConfig(cell_m=0.05)
 HALL = World2D(rectangle(-3.0, -1.0, 25.0, 1.03))  # long walls, seen at ever smaller angles
+
+
+@numba.njit
+def _free_around(view: View, x: float, y: float, half: float) -> float:
+    return free_around(view, x, y, half)
 
 
 def seen_from(pose: Array, n_beams: int) -> Observations:
@@ -125,3 +131,20 @@ def test_the_cost_is_that_of_the_neurons_in_view() -> None:
     whole = network.integrate(seen.view, seen.T_robot_laser, 0.2, write=False).visited
     assert visited == 0
     assert whole > 0
+
+
+def test_no_place_within_a_block_has_a_longer_free_range_than_is_told() -> None:
+    rng = np.random.default_rng(5)
+    bearings = np.arange(720) * math.tau / 720
+    view = view_of_beams(bearings, rng.uniform(0.5, 8.0, 720), math.tau / 720, 0.05)
+    for _ in range(2000):
+        x, y = rng.uniform(-9.0, 9.0, 2)
+        half = float(rng.uniform(0.05, 0.5))
+        way = float(rng.uniform(-math.pi, math.pi))
+        px, py = x + half * math.cos(way), y + half * math.sin(way)
+        k = math.floor(math.atan2(py, px) / view.step + 0.5) % len(view.limit)
+        free = _free_around(view, x, y, half)
+        if math.hypot(px, py) < view.limit[k]:
+            assert free >= view.limit[k]
+            assert free > math.hypot(x, y) - half - 1e-12
+        assert free <= view.farthest
