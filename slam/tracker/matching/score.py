@@ -12,7 +12,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, uncounted
+from slam._jit import inlined, inner, uncounted
 from slam.frontend.surfaces import opposite, turned_face
 from slam.tracker.cells import MASK, SHIFT, Cells
 
@@ -91,7 +91,7 @@ def _bell(a: float, b: float, d: float, tail: float, tail_cells: float) -> Bell:
     )  # fmt: skip
 
 
-@inner
+@inlined
 def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
     field: Field,
     short_term: float,
