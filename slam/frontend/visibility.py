@@ -137,7 +137,7 @@ def _beside(view: View, turns: float, r: float) -> float:
     return float(nearest * view.step * r)
 
 
-@inner
+@inlined
 def seen_empty(view: View, dx: float, dy: float, free: float) -> bool:
     """True where a beam passed by (dx, dy) (m, from the laser, laser axes) without stopping.
 

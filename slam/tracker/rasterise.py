@@ -13,7 +13,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, uncounted
+from slam._jit import inlined, inner, uncounted
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.surfaces import turned_face
@@ -65,7 +65,7 @@ def _touch(cells: Cells, column: int, row: int) -> int:
     return int(scratch)
 
 
-@inner
+@inlined
 def _rasterise_point(  # noqa: PLR0913 (kernel)
     cells: Cells,
     u: float,

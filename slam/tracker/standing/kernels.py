@@ -7,7 +7,7 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner, uncounted
+from slam._jit import inlined, inner, uncounted
 from slam.frontend.polar import BEARING_OFF, bearing, bin_of
 from slam.frontend.surfaces import apart
 
@@ -47,7 +47,7 @@ def _bin(turns: float, of: Asking, x: float, y: float, shift: float) -> int:
     return math.floor(math.atan2(y, x) / of.step + shift)
 
 
-@inner
+@inlined
 def _passed(
     limit: NDArray[np.float64], of: Asking, x: float, y: float, r: float, turns: float
 ) -> bool:
@@ -69,7 +69,7 @@ def _passed(
     return True
 
 
-@inner
+@inlined
 def _in_view(limit: NDArray[np.float64], of: Asking, r: float, turns: float) -> bool:
     """Whether nothing hid a place ``r`` m away, and a beam came that way.
 
