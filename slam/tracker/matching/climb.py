@@ -13,7 +13,7 @@ from slam._jit import inner, uncounted
 from slam.frontend.odometry_prior import inverse, turn
 from slam.tracker.matching.score import Field, Reward, Seen, evaluated
 
-SCRATCH = (13, 3)  # shape of the room that ``refine`` works in
+SCRATCH = (19, 3)  # shape of the room that a climb works in: of ``refine``, and two matrices
 
 
 class Climb(NamedTuple):
@@ -84,7 +84,7 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     the map is older, which would hold a robot back in a corridor. Returns reward, prior, the weight
     of matched observations and that of unmatched ones without a vote, and leaves the data's
     information (without tau and prior) in ``information``, all as before the last step. What is in
-    ``scratch`` (``SCRATCH``) does not matter.
+    the first 13 rows of ``scratch`` does not matter.
     """
     gradient, along, slope, step = scratch[0], scratch[1], scratch[2], scratch[3]
     trial, trial_gradient, trial_along = scratch[4], scratch[5], scratch[6]
@@ -178,13 +178,13 @@ def blur(
 class Numbers(NamedTuple):
     """Of a climb, in an order that kernels know: a named tuple takes longer on its way to one.
 
-    reward, climb  as they are
+    reward, climb  of ``Reward`` and ``Climb``, plain too
     full, exponent, tempered, least_weight  how the weight of the reward falls with the match
     least, most    of ``Widths``
     """
 
-    reward: Reward
-    climb: Climb
+    reward: tuple[Any, ...]
+    climb: tuple[Any, ...]
     full: float
     exponent: float
     tempered: float
@@ -229,22 +229,22 @@ def climbed(  # noqa: PLR0913 (kernel)
 
     ``every`` > 0: from where every so manieth of them leads, blurred by the ``prior``'s covariance;
     0: the prior is given by its inverse. ``plain``: ``Numbers``. ``few`` (``Seen``) and ``scratch``
-    (6 rows more than ``SCRATCH``): room to work in.
+    (``SCRATCH``): room to work in.
     Returns weight of the reward, matched and overlapped share, score and reward.
     """
     field, (reward, climb) = Field(directory, corner, x, y, facing), _numbers(plain)
+    _, _, full, exponent, enough, least_weight, least, most = plain
     seen = Seen(points, covariances, weights, tangents, facings, votes)
-    room, precision, blurred = scratch[: SCRATCH[0]], scratch[13:16], scratch[16:19]
-    full = plain[2]
+    precision, blurred = scratch[13:16], scratch[16:19]
     if every > 0:
         inverse(prior, precision)
         turn(prior, -prediction[2], blurred)
         m = -(-len(points) // every)
         those = Seen(few[0][:m], few[1][:m], few[2][:m], few[3][:m], few[4][:m], few[5][:m])
-        widths = Widths(prior[0, 0] + prior[1, 1], plain[6], plain[7])
+        widths = Widths(prior[0, 0] + prior[1, 1], least, most)
         if blur(seen, blurred, widths, every, those):
             refine(
-                field, reward, climb, those, pose, prediction, precision, full, information, room
+                field, reward, climb, those, pose, prediction, precision, full, information, scratch
             )
     else:
         for a in range(3):
@@ -254,13 +254,13 @@ def climbed(  # noqa: PLR0913 (kernel)
     tau, matched, overlapped, score, rewarded = full, 0.0, 0.0, -math.inf, 0.0
     while weight > 0.0:
         rewarded, of_prior, count, absent = refine(
-            field, reward, climb, seen, pose, prediction, precision, tau, information, room
+            field, reward, climb, seen, pose, prediction, precision, tau, information, scratch
         )
         overlapped = count / weight
         matched = count / (weight - absent) if count > 0.0 else 0.0
         score = full * rewarded + of_prior
-        tempered = max(full * matched ** plain[3], plain[5])
-        if tau < full or tempered > plain[4] * tau:
+        tempered = max(full * matched**exponent, least_weight)
+        if tau < full or tempered > enough * tau:
             break
         tau = tempered
     return tau, matched, overlapped, score, rewarded

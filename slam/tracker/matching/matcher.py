@@ -169,12 +169,10 @@ class Matcher:
             young_trace=config.standing.young_trace,
         )
         self.numbers = config.matching
-        steps = self.numbers.climb
-        self._climb = Climb(*(getattr(steps, name) for name in Climb._fields))
-        cell = config.cell_m
+        steps, cell = self.numbers.climb, config.cell_m
         numbers = Numbers(
-            tuple(self.reward),  # type: ignore[arg-type]  # plain, as its kernel says
-            tuple(self._climb),  # type: ignore[arg-type]
+            tuple(self.reward),
+            tuple(getattr(steps, name) for name in Climb._fields),
             config.reward,
             config.reward_exponent,
             steps.tempered,
@@ -188,7 +186,7 @@ class Matcher:
             np.empty((n, 2)), np.empty((n, 3)), np.empty(n), np.empty((n, 2)),
             np.empty(n, np.uint8), np.empty(n),
         )  # fmt: skip
-        self._scratch = np.empty((SCRATCH[0] + 6, 3))
+        self._scratch = np.empty(SCRATCH)
         self.usual = Usual(config.matching.usual)
         self._around = Around(self.reward.short_term)
 
