@@ -64,7 +64,7 @@ class TrackerConfig(Settings):
         "frontend.surfaces": "slam.frontend.surfaces",
         "frontend.view": "slam.frontend.visibility",
         "frontend.prior": "slam.frontend.odometry_prior",
-        "frontend.bias": "slam.frontend.odometry_prior",
+        "frontend.bias": "slam.frontend.heading_bias",
         "features.corners": "slam.frontend.corners",
     }
 
