@@ -19,7 +19,7 @@ from slam.frames import NS_PER_S, LaserSpec, Odometry, Scan
 from slam.frontend.heading_bias import HeadingBias
 from slam.frontend.motions import extended
 from slam.frontend.observations import Observations, from_scan
-from slam.frontend.odometry_prior import inverted, predict, squared
+from slam.frontend.odometry_prior import inverted, predict, squared, turned
 from slam.posegraph import Edge, optimise
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
@@ -68,7 +68,7 @@ def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None
         Odometry(stamp_ns=k, T_odom_robot=origin, increment_covariance=covariance) for k in (0, 1)
     ]
     prior = predict(origin, still[0], still[1]).covariance
-    squared(origin, prior)
+    squared(origin, turned(prior, 0.1))
     HeadingBias().learn(origin, 1.0, (1.0, 1.0), (1.0, 0.0, prior))
     extended(np.zeros(3), np.eye(3), origin, prior)
     compared(prior, prior, prior, prior, 0.0, prior, origin, 1.0, (0.0, 0.0))
@@ -76,6 +76,7 @@ def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None
         for write in (False, True):
             rasterise(one, seen, origin)
             one.integrate(seen.view, origin, 1.0, write=write)
+        one.release()
     standing = Standing(StandingConfig(thin_m=0.0))
     standing.add(0, origin, seen)
     standing.with_votes(NS_PER_S // 2, origin, covariance, seen)
