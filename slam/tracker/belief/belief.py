@@ -15,18 +15,19 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
+from slam.frontend.heading_bias import OUTLIER
 from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import Prediction, inverted
+from slam.frontend.odometry_prior import Prediction, squared
 from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.episode import Episode, second_moment
 from slam.tracker.belief.evidence import Evidence, vanished
+from slam.tracker.belief.nearby import best_nearby
 from slam.tracker.belief.places import Place, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State, Status
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import Look
 from slam.tracker.config import TrackerConfig
-from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher, Usual, near, unmatched
 from slam.tracker.standing.agreement import Agreement
 
@@ -212,20 +213,13 @@ class Belief:
         prediction: Prediction,
         match: Match,
     ) -> None:
-        """Look for the best place as far around as a slip may have led."""
+        """Look for the best place nearby, now and then."""
         numbers = self._numbers
         if self._since_near_s < numbers.again_near_s or observations.weight < numbers.least_near:
             return
         self._since_near_s, self.busy = 0.0, max(self.busy, 0.5)
         everyone = observations.with_votes(None)
-        every = max(1, len(everyone.points_robot) // numbers.near_points)
-        points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
-        few = replace(everyone, points_robot=points, weights=weights)
-        loose = inverted(spread(self._config.slip_m, self._config.slip_rad))
-        window = SearchWindow(reach_m=numbers.near_m, turn_rad=numbers.near_rad)
-        start = prediction.T_map_robot
-        found = self._matcher.search(cell_map, few, start, loose, window)
-        found = self._matcher.climb(cell_map, everyone, found.T_map_robot, start, loose)
+        found = best_nearby(self._matcher, self._agreement, cell_map, everyone, prediction)
         if not _same(found, match):
             place = episode.places.begun(everyone, found, episode.before)
             place = self._told_nearby(episode, place, match)
@@ -252,9 +246,10 @@ class Belief:
         episode.moved(prediction)
         match = self._followed(episode, cell_map, observations, prediction)
         moved = prediction
-        if episode.matched:
-            increment = se2.between(T_map_before, match.T_map_robot)
-            moved = replace(prediction, T_map_robot=match.T_map_robot, increment=increment)
+        T_map_robot, off = match.T_map_robot, prediction.off(match.T_map_robot)
+        if episode.matched and squared(off, prediction.step) <= OUTLIER:  # not so after a kidnap
+            increment = se2.between(T_map_before, T_map_robot)
+            moved = replace(prediction, T_map_robot=T_map_robot, increment=increment)
         everyone = observations.with_votes(None)
         new = episode.places.step(everyone, moved, self._share(), episode.evidence)
         new = [self._told_nearby(episode, place, match) for place in new]

@@ -14,7 +14,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
-from slam.frontend.odometry_prior import Prediction, turned, upper_inverted
+from slam.frontend.odometry_prior import Prediction, inverted, turned, upper_inverted
 from slam.tracker.standing.config import StandingConfig
 
 
@@ -80,6 +80,17 @@ class Agreement:
         keep = math.exp(-elapsed_s / self._pull.held_s)
         self._held = [keep * a + b for a, b in zip(self._held, old.tolist(), strict=True)]
         self._looks = keep * self._looks + 1.0
+
+    def shown(self, covariance: Float, old: Float) -> Float:
+        """(3, 3) part of an error of the pose with this covariance C that old surface G (6,) shows.
+
+        ``C - (1 / C + G / (holds C_xx))^-1``: nothing along a bare corridor, though a scan among
+        people fits best somewhere there.
+        """
+        times = 1.0 / (self._pull.holds * float(covariance[0, 0]))
+        xx, xy, xt, yy, yt, tt = (v * times for v in old.tolist())
+        known = inverted(covariance) + np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
+        return covariance - inverted(known)
 
     def _left_to_movers(
         self, vote: float, off: Float, in_doubt: bool

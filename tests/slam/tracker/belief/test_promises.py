@@ -14,7 +14,7 @@ from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.episode import Episode
 from slam.tracker.belief.posterior import Odds
 from slam.tracker.cells import used
-from slam.tracker.matching.matcher import Matcher
+from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.tracker import Tracker
 from tests.slam.tracker.belief.drives import (
     DOUBTFUL,
@@ -78,6 +78,27 @@ def test_a_carried_robot_is_lost_until_it_is_found_and_then_its_map_is_right() -
             assert words["verdict"] == "tracking"
             assert words["p_lost"] < 0.5
     assert states(said)[-1] == "tracking"
+
+
+def test_places_move_by_odometry_where_it_denies_the_match(monkeypatch: pytest.MonkeyPatch) -> None:
+    """The old map pulls the first match after a kidnap: from there the next one jumps back."""
+    system, last = mapped(ROOMS, LONG_TURN)
+    first, second, *_ = going_on(still(ROOMS, (3.0, 2.5, -1.0), 0.8), last)
+    system.update(first.without_truth())
+    belief, jump = system._belief, np.array([0.13, -0.05, 0.04])
+    plain = belief._match
+
+    def pulled(*arguments: Any) -> Match:
+        match = plain(*arguments)
+        return replace(match, T_map_robot=match.T_map_robot + jump)
+
+    monkeypatch.setattr(belief, "_match", pulled)
+    monkeypatch.setattr(belief, "_is_dragged", lambda *_: False)  # which would be odometry, too
+    system.update(second.without_truth())
+    assert belief._episode is not None
+    assert belief._episode.matched
+    _, since_first = belief._episode.places._kept[0]
+    assert since_first == pytest.approx(np.zeros(3), abs=5e-3)
 
 
 def test_the_covariance_of_a_lost_robot_covers_all_that_it_has_seen() -> None:
