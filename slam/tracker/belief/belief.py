@@ -17,17 +17,17 @@ from slam import se2
 from slam.frames import Float
 from slam.frontend.heading_bias import OUTLIER
 from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import Prediction, squared
+from slam.frontend.odometry_prior import Prediction, inverted, squared
 from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.episode import Episode, second_moment
 from slam.tracker.belief.evidence import Evidence, vanished
-from slam.tracker.belief.nearby import best_nearby
-from slam.tracker.belief.places import Place, spread
+from slam.tracker.belief.places import Place, is_same, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State, Status
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import Look
 from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher, Usual, near, unmatched
 from slam.tracker.standing.agreement import Agreement
 
@@ -213,14 +213,22 @@ class Belief:
         prediction: Prediction,
         match: Match,
     ) -> None:
-        """Look for the best place nearby, now and then."""
+        """Look for the best place as far around as a slip may have led."""
         numbers = self._numbers
         if self._since_near_s < numbers.again_near_s or observations.weight < numbers.least_near:
             return
         self._since_near_s, self.busy = 0.0, max(self.busy, 0.5)
         everyone = observations.with_votes(None)
-        found = best_nearby(self._matcher, self._agreement, cell_map, everyone, prediction)
-        if not _same(found, match):
+        every = max(1, len(everyone.points_robot) // numbers.near_points)
+        points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
+        few = replace(everyone, points_robot=points, weights=weights)
+        slip = self._agreement.shown(spread(self._config.slip_m, self._config.slip_rad))
+        loose = inverted(slip + prediction.covariance)  # what does not show is not searched for
+        window = SearchWindow(reach_m=numbers.near_m, turn_rad=numbers.near_rad)
+        start = prediction.T_map_robot
+        found = self._matcher.search(cell_map, few, start, loose, window)
+        found = self._matcher.climb(cell_map, everyone, found.T_map_robot, start, loose)
+        if not is_same(found, match):
             place = episode.places.begun(everyone, found, episode.before)
             place = self._told_nearby(episode, place, match)
             episode.places.keep([place], episode.weight, self._config.hopeless)
@@ -299,7 +307,7 @@ class Belief:
         at_same = (
             p
             for place, p in zip(episode.places.followed, self._weighed.places, strict=True)
-            if _same(place.match, episode.match)
+            if is_same(place.match, episode.match)
         )
         self.p_lost = self._p_off = max(0.0, 1.0 - self._weighed.followed - sum(at_same))
         self._likeliest = None
@@ -335,7 +343,7 @@ class Belief:
         weighed, sure = self._weighed, 1.0 - self._config.frozen_above
         waited_enough = episode.elapsed_s > self._give_up_s
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
-            same = _same(place.match, match) and p > weighed.followed
+            same = is_same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
             # the robot has left the map: no scan will tell more
             left = waited_enough and place.unseen_s >= LEFT_S
@@ -387,9 +395,3 @@ class Belief:
         spreads = second_moment(poses, shares, T_map_robot)
         # the places that are followed need not be all: who is lost may be anywhere
         return spreads + self.p_lost * anywhere(T_map_robot)
-
-
-def _same(one: Match, other: Match) -> bool:
-    """Nearer than what a match may be off."""
-    x, y, turn = (one.T_map_robot - other.T_map_robot).tolist()
-    return bool(np.hypot(x, y) < 0.1 and abs(se2.wrap(turn)) < 0.05)

@@ -36,6 +36,12 @@ def coarse(config: RelocaliseConfig) -> Float:
     return spread(config.coarse_m, math.radians(config.coarse_deg))
 
 
+def is_same(one: Match, other: Match) -> bool:
+    """Nearer than what a match may be off."""
+    x, y, turn = (one.T_map_robot - other.T_map_robot).tolist()
+    return bool(np.hypot(x, y) < 0.1 and abs(se2.wrap(turn)) < 0.05)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Place:
     """One where the robot may be.

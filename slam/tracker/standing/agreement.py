@@ -81,14 +81,14 @@ class Agreement:
         self._held = [keep * a + b for a, b in zip(self._held, old.tolist(), strict=True)]
         self._looks = keep * self._looks + 1.0
 
-    def shown(self, covariance: Float, old: Float) -> Float:
-        """(3, 3) part of an error of the pose with this covariance C that old surface G (6,) shows.
+    def shown(self, covariance: Float) -> Float:
+        """(3, 3) part of an error of the pose with this covariance C that old surface shows.
 
         ``C - (1 / C + G / (holds C_xx))^-1``: nothing along a bare corridor, though a scan among
         people fits best somewhere there.
         """
-        times = 1.0 / (self._pull.holds * float(covariance[0, 0]))
-        xx, xy, xt, yy, yt, tt = (v * times for v in old.tolist())
+        times = 1.0 / (self._pull.holds * float(covariance[0, 0]) * max(self._looks, 1.0))
+        xx, xy, xt, yy, yt, tt = (v * times for v in self._held)
         known = inverted(covariance) + np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
         return covariance - inverted(known)
 

@@ -193,15 +193,16 @@ def test_in_a_map_that_was_turned_the_old_surface_holds_as_before() -> None:
 
 def test_old_surface_shows_an_error_across_it_and_none_along() -> None:
     """A slip along a bare corridor does not show: its best place for a scan is any."""
-    slip, agreement = np.diag([0.25**2, 0.25**2, 0.2**2]), fed(np.zeros((1, 3)))
+    slip = np.diag([0.25**2, 0.25**2, 0.2**2])
+    c, s = math.cos(0.7), math.sin(0.7)
     corridor = np.array([0.0, 0.0, 0.0, 40.0, 0.0, 200.0])
-    nothing, along, room = (agreement.shown(slip, old) for old in (NOTHING, corridor, A_ROOM))
+    turned = np.array([40.0 * s * s, -40.0 * s * c, 0.0, 40.0 * c * c, 0.0, 200.0])
+    nothing, along, slanted, room = (
+        fed(np.zeros((20, 3)), old).shown(slip) for old in (NOTHING, corridor, turned, A_ROOM)
+    )
     assert nothing == pytest.approx(np.zeros((3, 3)), abs=1e-12)
     assert along[0] == pytest.approx(np.zeros(3), abs=1e-12)
     assert along[1, 1] == pytest.approx(slip[1, 1] * 40.0 / (40.0 + PULL.holds))
+    assert slanted @ np.array([c, s, 0.0]) == pytest.approx(np.zeros(3), abs=1e-12)
     assert (np.diag(room)[:2] / np.diag(slip)[:2] > 0.95).all()
-    c, s = math.cos(0.7), math.sin(0.7)
-    turned = np.array([40.0 * s * s, -40.0 * s * c, 0.0, 40.0 * c * c, 0.0, 200.0])
-    along = agreement.shown(slip, turned)
-    assert along @ np.array([c, s, 0.0]) == pytest.approx(np.zeros(3), abs=1e-12)
-    assert np.linalg.eigvalsh(slip - agreement.shown(slip, A_ROOM)).min() > 0.0
+    assert np.linalg.eigvalsh(slip - room).min() > 0.0
