@@ -36,14 +36,14 @@ def _three(pose: Float) -> Triple:
 
 
 @inner
-def _between(before: Float, now: Float) -> Triple:
+def _between(before: Triple, now: Triple) -> Triple:
     x, y, c, s = before[0], before[1], math.cos(before[2]), math.sin(before[2])
-    return _composed((-c * x - s * y, s * x - c * y, wrapped(-before[2])), _three(now))
+    return _composed((-c * x - s * y, s * x - c * y, wrapped(-before[2])), now)
 
 
 @uncounted
 def chained(
-    before: Float, now: Float, T_map_before: Float, biases: tuple[float, float],
+    before: Triple, now: Triple, T_map_before: Float, biases: tuple[float, float],
     increment: Float, T_map_robot: Float,
 ) -> None:  # fmt: skip
     """Fill the ``increment`` from pose to pose of an odometry with those heading biases (rad/m,

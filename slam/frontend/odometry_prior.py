@@ -289,7 +289,9 @@ def predict(
     check_step(before, now)
     increment, T_map_robot = np.empty(3), np.empty(3)
     biases = (0.0, 0.0) if bias is None else (bias.per_m, bias.per_rad)
-    chained(before.T_odom_robot, now.T_odom_robot, T_map_before, biases, increment, T_map_robot)
+    # numbers, not arrays: those of frames are read-only, but for copies, which would compile anew
+    ends = (tuple(end.T_odom_robot.tolist()) for end in (before, now))
+    chained(*ends, T_map_before, biases, increment, T_map_robot)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given, (along, turning) = now.increment_covariance, scales
     unscaled = assumed_covariance(increment) if given is None else invertible(given)

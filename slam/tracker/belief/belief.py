@@ -15,7 +15,6 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
-from slam.frontend.heading_bias import OUTLIER
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, squared
 from slam.tracker.belief.config import LENIENT
@@ -31,6 +30,7 @@ from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher, Usual, near, unmatched
 from slam.tracker.standing.agreement import Agreement
 
+DENIED = 14.2  # squared, in variances, of three numbers: odometry allows less in 997 of 1000
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
 LEFT_S = 3.0  # for so long nothing of the map is in view: no crowd in passing; set by hand
 
@@ -213,7 +213,7 @@ class Belief:
         prediction: Prediction,
         match: Match,
     ) -> None:
-        """Look for the best place as far around as a slip may have led."""
+        """Look for the best place as far around as a slip may have led, and shows."""
         numbers = self._numbers
         if self._since_near_s < numbers.again_near_s or observations.weight < numbers.least_near:
             return
@@ -223,7 +223,7 @@ class Belief:
         points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
         few = replace(everyone, points_robot=points, weights=weights)
         slip = self._agreement.shown(spread(self._config.slip_m, self._config.slip_rad))
-        loose = inverted(slip + prediction.covariance)  # what does not show is not searched for
+        loose = inverted(slip + prediction.prior)
         window = SearchWindow(reach_m=numbers.near_m, turn_rad=numbers.near_rad)
         start = prediction.T_map_robot
         found = self._matcher.search(cell_map, few, start, loose, window)
@@ -254,8 +254,9 @@ class Belief:
         episode.moved(prediction)
         match = self._followed(episode, cell_map, observations, prediction)
         moved = prediction
+        # the old map may have pulled the match before: from there the next one jumps
         T_map_robot, off = match.T_map_robot, prediction.off(match.T_map_robot)
-        if episode.matched and squared(off, prediction.step) <= OUTLIER:  # not so after a kidnap
+        if episode.matched and squared(off, prediction.step) <= DENIED:
             increment = se2.between(T_map_before, T_map_robot)
             moved = replace(prediction, T_map_robot=T_map_robot, increment=increment)
         everyone = observations.with_votes(None)

@@ -12,9 +12,11 @@ import pytest
 from slam.frontend.observations import observe
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.episode import Episode
+from slam.tracker.belief.places import Place, Places
 from slam.tracker.belief.posterior import Odds
 from slam.tracker.cells import used
 from slam.tracker.matching.matcher import Match, Matcher
+from slam.tracker.standing.agreement import Agreement
 from slam.tracker.tracker import Tracker
 from tests.slam.tracker.belief.drives import (
     DOUBTFUL,
@@ -149,6 +151,27 @@ def test_a_robot_that_is_pushed_far_is_followed_or_found(push: tuple[float, floa
     assert max(off_m(one, aside) for one in believed) < 0.1
     assert said[-1].converged
     assert off_m(said[-1], aside) < 0.03
+
+
+@pytest.mark.parametrize("shows", [True, False])
+def test_a_place_nearby_is_only_looked_for_where_old_surface_shows_it(
+    shows: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    system, last = mapped(ROOMS, LONG_TURN)
+    if not shows:
+        monkeypatch.setattr(Agreement, "shown", lambda *_: np.zeros((3, 3)))
+    plain, nearby = Places.begun, []
+
+    def begun(places: Places, *arguments: Any) -> Place:
+        nearby.append(plain(places, *arguments))
+        return nearby[-1]
+
+    monkeypatch.setattr(Places, "begun", begun)
+    aside: Any = tuple((np.array(at(system)) + (0.3, 0.0, 0.0)).tolist())
+    first, *_ = going_on(still(ROOMS, aside, 1.0), last)
+    system.update(first.without_truth())
+    assert len(nearby) == shows
+    assert all(abs(place.match.T_map_robot - aside).max() < 0.05 for place in nearby)
 
 
 def test_in_a_symmetric_room_dead_reckoning_says_which_of_two_places() -> None:
