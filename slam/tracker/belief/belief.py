@@ -223,7 +223,7 @@ class Belief:
         points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
         few = replace(everyone, points_robot=points, weights=weights)
         slip = self._agreement.shown(spread(self._config.slip_m, self._config.slip_rad))
-        loose = inverted(slip + prediction.prior)
+        loose = inverted(slip + prediction.step)  # not what adds up where nothing shows it
         window = SearchWindow(reach_m=numbers.near_m, turn_rad=numbers.near_rad)
         start = prediction.T_map_robot
         found = self._matcher.search(cell_map, few, start, loose, window)

@@ -167,7 +167,8 @@ def test_a_place_nearby_is_only_looked_for_where_old_surface_shows_it(
         return nearby[-1]
 
     monkeypatch.setattr(Places, "begun", begun)
-    aside: Any = tuple((np.array(at(system)) + (0.3, 0.0, 0.0)).tolist())
+    x, y, heading = at(system)
+    aside = (x + 0.3, y, heading)
     first, *_ = going_on(still(ROOMS, aside, 1.0), last)
     system.update(first.without_truth())
     assert len(nearby) == shows
