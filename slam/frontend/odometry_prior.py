@@ -290,7 +290,8 @@ def predict(
     increment, T_map_robot = np.empty(3), np.empty(3)
     biases = (0.0, 0.0) if bias is None else (bias.per_m, bias.per_rad)
     # numbers, not arrays: those of frames are read-only, but for copies, which would compile anew
-    ends = (tuple(end.T_odom_robot.tolist()) for end in (before, now))
+    (x, y, turn), (x_now, y_now, turn_now) = (end.T_odom_robot.tolist() for end in (before, now))
+    ends = (x, y, turn), (x_now, y_now, turn_now)
     chained(*ends, T_map_before, biases, increment, T_map_robot)
     elapsed = (now.stamp_ns - before.stamp_ns) * 1e-9
     given, (along, turning) = now.increment_covariance, scales
