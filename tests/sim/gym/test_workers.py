@@ -95,10 +95,15 @@ def test_a_fork_that_holds_the_pipes_does_not_keep_workers():
         os.waitpid(child, 0)
 
 
+def interrupted() -> None:
+    """As SIGINT does, which a shell's background jobs ignore."""
+    raise KeyboardInterrupt
+
+
 def test_an_answer_that_an_interrupt_left_behind_is_not_taken_for_the_next(rooms):
     rooms.reset(seed=1)
     worker = rooms._rooms._workers[0][1]
-    receive, worker.recv = worker.recv, lambda: signal.raise_signal(signal.SIGINT)
+    receive, worker.recv = worker.recv, interrupted
     with pytest.raises(KeyboardInterrupt):
         rooms.step(np.zeros((3, 2)))
     worker.recv = receive
