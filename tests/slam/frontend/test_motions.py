@@ -31,7 +31,8 @@ def test_an_increment_and_where_it_leads_are_those_of_se2() -> None:
         before, now, at = rng.normal(0.0, 3.0, (3, 3))
         biases = float(rng.normal(0.0, 0.1)), float(rng.normal(0.0, 0.1))
         increment, T_map_robot = np.empty(3), np.empty(3)
-        chained(before, now, at, biases, increment, T_map_robot)
+        ends = tuple(before.tolist()), tuple(now.tolist())
+        chained(*ends, at, biases, increment, T_map_robot)
         x, y, turn = se2.between(before, now).tolist()
         turn = turn * (1.0 - biases[1]) - x * biases[0]
         np.testing.assert_array_equal(increment, [x, y, turn])
