@@ -64,9 +64,11 @@ class Look(NamedTuple):
 
     confirmed     trace that it confirms; ``contradicted``: that it sees through
     visited       cells that it says something of
-    known         m of long-known surface that it confirms; ``through``: that it sees through. A
-                  trace y that was looked at for ``age`` s counts y age / (age + known_s), and one
-                  that was ``counted`` before counts by what is more of it now
+    known         m of long-known surface that it confirms: a trace y that was looked at for ``age``
+                  s counts w = y age / (age + known_s)
+    through       m of it that it sees through: (w / ``SURE`` of the map)^2. What was there in few
+                  of the looks was no wall, and need not be there now. Of both, what was
+                  ``counted`` before counts by what is more of it now
     """
 
     confirmed: float
@@ -78,6 +80,7 @@ class Look(NamedTuple):
 
 ANEW = np.zeros((2, 0, SIDE, SIDE), np.uint8)  # nothing was counted, and nothing is kept of it
 WHOLE = 255.0  # of a cell that is counted
+KNOWN, THROUGH = 0, 1  # kinds of what is counted
 
 
 def uncounted(cells: Cells) -> NDArray[np.uint8]:
@@ -89,14 +92,17 @@ def uncounted(cells: Cells) -> NDArray[np.uint8]:
 def fresh(  # noqa: PLR0913 (kernel)
     counted: NDArray[np.uint8], once: bool, kind: int, slot: int, j: int, i: int, weight: float
 ) -> float:
-    """What of a weight in [0, 1] was not counted before; it is now."""
-    if not once:
-        return weight
-    now, before = np.uint8(WHOLE * weight + 0.5), counted[kind, slot, j, i]
-    if now <= before:
-        return 0.0
-    counted[kind, slot, j, i] = now
-    return (float(now) - float(before)) / WHOLE
+    """What of a weight in [0, 1] was not counted before; it is now. Its square if seen through."""
+    before = 0.0
+    if once:
+        now, earlier = np.uint8(WHOLE * weight + 0.5), counted[kind, slot, j, i]
+        if now <= earlier:
+            return 0.0
+        counted[kind, slot, j, i] = now
+        if kind == KNOWN:
+            return (float(now) - float(earlier)) / WHOLE
+        weight, before = float(now) / WHOLE, float(earlier) / WHOLE
+    return weight if kind == KNOWN else weight * weight - before * before
 
 
 def no_cells(slots: int = FIRST, scratch: int = FIRST) -> Cells:

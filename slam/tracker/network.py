@@ -19,9 +19,11 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
     ANEW,
     FREE_COUNT,
+    KNOWN,
     MASK,
     SHIFT,
     SIDE,
+    THROUGH,
     Cells,
     Look,
     fresh,
@@ -30,6 +32,10 @@ from slam.tracker.cells import (
     released,
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
+
+# w, known share of a trace, at which a cell that is seen through counts whole; sets the unit of D
+# such that ``belief.through_per_m`` is as fitted
+SURE = 0.35
 
 
 class Law(NamedTuple):
@@ -139,13 +145,13 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                         weight = (
                             y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
                         )
-                        through += fresh(counted, once, 1, slot, jj, ii, weight)
+                        through += fresh(counted, once, THROUGH, slot, jj, ii, weight)
                     elif not behind:
                         confirmed += y * given
                         weight = (
                             y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
                         )
-                        known += fresh(counted, once, 0, slot, jj, ii, weight * given)
+                        known += fresh(counted, once, KNOWN, slot, jj, ii, weight * given)
                     visited += 1
                     if not write:
                         continue
@@ -176,7 +182,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                 cells.counts[FREE_COUNT] += 1
     if write:
         released(cells)
-    return Look(confirmed, contradicted, visited, known * cell, through * cell)
+    return Look(confirmed, contradicted, visited, known * cell, through * cell / SURE**2)
 
 
 class Network(CellMap):

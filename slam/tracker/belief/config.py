@@ -27,7 +27,7 @@ class BeliefConfig(Settings):
         3.0, "nats/m", "b: of long-known surface that they see through", FITTED, low=1e-3
     )
     outdated: float = number(
-        4.4, "nats", "price of a room that has changed: b to there, changed_per_m beyond", FITTED
+        3.6, "nats", "price of a room that has changed: b to there, changed_per_m beyond", FITTED
     )
     changed_per_m: float = number(
         0.64, "nats/m", "of long-known surface that is seen through in such a room", FITTED
