@@ -55,14 +55,32 @@ def test_a_board_before_everything_says_nothing_either_way(kind: Kind) -> None:
 
 
 def test_what_has_gone_is_seen_through_by_its_length(kind: Kind) -> None:
-    cell_map = known(kind, FURNISHED, 60.0, ORIGIN)
-    evidence = Evidence()
-    evidence.add(cell_map, seen(FREE, ORIGIN, kind), ORIGIN)
-    assert 0.5 < evidence.through_m < 2.0
-    stays = Evidence()
-    stays.add(cell_map, seen(FURNISHED, ORIGIN, kind), ORIGIN)
-    assert stays.through_m < 0.1 * evidence.through_m
-    assert stays.known_m > evidence.known_m
+    gone_m = []
+    for half in (0.5, 1.0):
+        box = rectangle(1.5, -half, 2.5, half)
+        furnished = World2D(np.vstack([arena(), box]))
+        cell_map = known(kind, furnished, 60.0, ORIGIN)
+        evidence, stays = Evidence(), Evidence()
+        evidence.add(cell_map, seen(FREE, ORIGIN, kind), ORIGIN)
+        stays.add(cell_map, seen(furnished, ORIGIN, kind), ORIGIN)
+        assert stays.through_m < 0.1 * evidence.through_m
+        assert stays.known_m > evidence.known_m
+        gone_m.append(evidence.through_m)
+    assert gone_m[1] == pytest.approx(2.0 * gone_m[0], rel=0.2)
+
+
+def test_what_was_hardly_known_counts_by_its_square_when_it_is_gone(kind: Kind) -> None:
+    """People stand about for a while, all over a hall: none of that tells that it is another."""
+    kept_m, gone_m = [], []
+    for seconds in (2.0, 60.0):
+        cell_map = known(kind, FURNISHED, seconds, ORIGIN)
+        for world, of in ((FURNISHED, kept_m), (FREE, gone_m)):
+            evidence = Evidence()
+            evidence.add(cell_map, seen(world, ORIGIN, kind), ORIGIN)
+            of.append(evidence.known_m if world is FURNISHED else evidence.through_m)
+    share = kept_m[0] / kept_m[1]
+    assert 0.1 < share < 0.5
+    assert gone_m[0] / gone_m[1] == pytest.approx(share**2, rel=0.25)
 
 
 def test_a_wrong_pose_is_denied_and_the_right_one_is_not(kind: Kind) -> None:
