@@ -27,7 +27,7 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
-from slam.tracker.belief.config import LENIENT
+from slam.tracker.belief.config import LENIENT, BeliefConfig
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse, spread
 from slam.tracker.belief.posterior import Odds, probabilities
@@ -173,6 +173,13 @@ class Start:
     probability: float
 
 
+def changed(belief: BeliefConfig) -> BeliefConfig:
+    """The numbers for a room that has changed: all places pay ``outdated`` alike, and what is seen
+    through costs from there on.
+    """
+    return replace(belief, through_m=belief.through_m * math.exp(belief.outdated / belief.through))
+
+
 class StartSearch:
     """Maps alone and searches the known map, until the start is found.
 
@@ -184,8 +191,7 @@ class StartSearch:
         self._known, self._past = known, past
         numbers = known.config
         self._belief, self._budget = numbers.belief, numbers.matching.budget
-        changed = replace(numbers.belief, outdated=0.0)  # rooms have, since: all places pay alike
-        self._odds = Odds(changed, numbers.carried_per_h)
+        self._odds = Odds(changed(numbers.belief), numbers.carried_per_h)
         self._prior = -numbers.belief.place - numbers.belief.outdated
         self.seen: list[tuple[Frame, Float]] = []
         self.alone = type(known)(numbers)

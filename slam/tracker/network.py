@@ -34,7 +34,7 @@ from slam.tracker.cells import (
 from slam.tracker.config import TrackerConfig
 
 # w, known share of a trace, at which a cell that is seen through counts whole; sets the unit of D
-# such that ``belief.through_per_m`` is as fitted
+# such that a wall that is gone counts about its length
 SURE = 0.35
 
 

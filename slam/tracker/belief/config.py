@@ -23,14 +23,13 @@ class BeliefConfig(Settings):
     linear_m: float = number(
         6.0, "m", "of surface from which on it counts a metre alike: more than one view shows"
     )
-    through_per_m: float = number(
-        3.0, "nats/m", "b: of long-known surface that they see through", FITTED, low=1e-3
+    through: float = number(
+        2.8, "nats", "e: of long-known surface D that they see through, - e log(1 + D / d)", FITTED
     )
+    through_m: float = number(0.53, "m", "d: less than it may be seen through by chance", FITTED,
+        low=1e-3)  # fmt: skip
     outdated: float = number(
-        3.6, "nats", "price of a room that has changed: b to there, changed_per_m beyond", FITTED
-    )
-    changed_per_m: float = number(
-        0.64, "nats/m", "of long-known surface that is seen through in such a room", FITTED
+        6.0, "nats", "that it costs where the room has changed: the map is outdated here"
     )
     broken: float = number(
         8.5, "nats", "that it costs if hardly a return goes on from the scans before", low=1e-3

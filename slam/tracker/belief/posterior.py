@@ -34,7 +34,7 @@ class Odds:
         return self._carried_per_h > 0.0
 
     def evidence(self, of: Evidence | Look) -> float:
-        """Nats for a place: a log(1 + C / c) - D, where a changed room explains most of D."""
+        """Nats for a place: a log(1 + C / c) - e log(1 + D / d)."""
         config = self.config
         known, through = (of.known, of.through) if isinstance(of, Look) else (
             of.known_m, of.through_m
@@ -44,12 +44,10 @@ class Odds:
         return config.confirmed * more - self.denied(through)
 
     def denied(self, through_m: float) -> float:
-        """Nats against a place: b a metre, or the price of a room that has changed."""
-        config = self.config
-        beyond_m = through_m - config.outdated / config.through_per_m
-        if beyond_m <= 0.0:
-            return config.through_per_m * through_m
-        return config.outdated + config.changed_per_m * beyond_m
+        """Nats against a place: a metre more says less than the one before, in a room that has
+        changed, too.
+        """
+        return self.config.through * math.log1p(through_m / self.config.through_m)
 
     def broken(self, share: float, vanished: float = 0.0) -> float:
         """Nats against a place where so much of the usual match goes on from the scans before, and

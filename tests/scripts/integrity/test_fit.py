@@ -21,12 +21,12 @@ from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.posterior import Odds
 
 TRUE = {
-    "confirmed": 4.0, "confirmed_m": 0.6, "through_per_m": 3.0, "outdated": 4.5,
-    "changed_per_m": 0.3, "place": 3.0, "linear_m": 5.0,
+    "confirmed": 4.0, "confirmed_m": 0.6, "through": 3.0, "through_m": 0.5,
+    "place": 3.0, "linear_m": 5.0,
 }  # fmt: skip
 START = {
-    "confirmed": 7.0, "confirmed_m": 1.2, "through_per_m": 6.0, "outdated": 7.0,
-    "changed_per_m": 0.6, "place": 5.0, "linear_m": 5.0,
+    "confirmed": 7.0, "confirmed_m": 1.2, "through": 6.0, "through_m": 1.0,
+    "place": 5.0, "linear_m": 5.0,
 }  # fmt: skip
 
 
@@ -88,7 +88,7 @@ def test_weights_that_scans_were_drawn_with_are_found_again(synthetic):
     assert np.abs(of[0] - of[1]).max() < 1.2
     groups = len(scans.found.stream) / len(scans.none.stream)
     assert found["place"] == pytest.approx(TRUE["place"] + math.log(groups), abs=0.6)
-    assert found["through_per_m"] == pytest.approx(TRUE["through_per_m"], rel=0.25)
+    assert found["through"] == pytest.approx(TRUE["through"], rel=0.25)
     ones = np.ones(scans.streams)
     assert likelihood(found, scans, ones) >= likelihood(TRUE, scans, ones)
     assert weights.fit(scans, START) == found
@@ -97,13 +97,13 @@ def test_weights_that_scans_were_drawn_with_are_found_again(synthetic):
 def test_intervals_come_from_the_streams(synthetic):
     some = weights.fitted(synthetic, BeliefConfig(), resampled=3)
     assert set(some) == {*JOINT, *weights.ALONE}
-    for name in ("through_per_m", "outdated"):
+    for name in ("through", "confirmed"):
         value, low, high = some[name]
         assert low < value * 1.2
         assert high > value * 0.8
         assert 0.0 < high - low < 2.0 * value
     alike = [replace(synthetic[0], stream=str(k)) for k in range(3)]
-    value, low, high = weights.fitted(alike, BeliefConfig(), resampled=2)["outdated"]
+    value, low, high = weights.fitted(alike, BeliefConfig(), resampled=2)["through"]
     assert high - low < 1e-2 * value  # streams that are alike leave nothing open
 
 

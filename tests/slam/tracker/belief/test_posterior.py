@@ -26,7 +26,6 @@ from slam.tracker.cells import Look
 Array = NDArray[np.float64]
 CONFIG = BeliefConfig()
 ODDS = Odds(CONFIG, carried_per_h=1.0)
-KINK_M = CONFIG.outdated / CONFIG.through_per_m
 NEVER = replace(CONFIG, slips_per_m=1e-300)  # a slip costs more than any innovation here
 
 
@@ -66,14 +65,14 @@ def test_what_is_confirmed_counts_ever_less_and_then_alike(through_m: float) -> 
     assert after == pytest.approx(before, rel=1e-3)
 
 
-def test_the_price_of_a_changed_room_has_no_step() -> None:
-    assert ODDS.denied(KINK_M) == pytest.approx(CONFIG.outdated)
-    assert ODDS.denied(0.5 * KINK_M) == pytest.approx(0.5 * CONFIG.outdated)
-    near = 1e-9
-    assert ODDS.denied(KINK_M + near) - ODDS.denied(KINK_M - near) < 1e-6
-    assert ODDS.denied(KINK_M + 2.0) == pytest.approx(CONFIG.outdated + 2.0 * CONFIG.changed_per_m)
-    prices = [ODDS.denied(0.01 * k) for k in range(1000)]
-    assert (np.diff(prices) >= 0.0).all()
+def test_what_is_seen_through_costs_ever_less() -> None:
+    prices = np.array([ODDS.denied(0.1 * k) for k in range(1000)])
+    assert (np.diff(prices) > 0.0).all()
+    assert (np.diff(prices, 2) < 0.0).all()
+    first = CONFIG.through / CONFIG.through_m  # nats a metre
+    assert ODDS.denied(1e-6) == pytest.approx(1e-6 * first, rel=1e-3)
+    doubled = ODDS.denied(2000.0) - ODDS.denied(1000.0)
+    assert doubled == pytest.approx(CONFIG.through * math.log(2.0), rel=1e-3)
 
 
 def test_a_scan_and_many_weigh_by_the_same_law() -> None:
