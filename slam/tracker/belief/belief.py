@@ -228,10 +228,11 @@ class Belief:
         start = prediction.T_map_robot
         found = self._matcher.search(cell_map, few, start, loose, window)
         found = self._matcher.climb(cell_map, everyone, found.T_map_robot, start, loose)
-        if not is_same(found, match):
-            place = episode.places.begun(everyone, found, episode.before)
-            place = self._told_nearby(episode, place, match)
-            episode.places.keep([place], episode.weight, self._config.hopeless)
+        # the robot may have slipped now, or its motion led it astray some scans ago
+        begun = (episode.places.begun(everyone, found, of) for of in (episode.before, None))
+        likelier = max(begun, key=lambda place: self._odds.evidence(place.evidence))
+        place = self._told_nearby(episode, likelier, match)
+        episode.places.keep([place], episode.weight, self._config.hopeless)
 
     @staticmethod
     def _told_nearby(episode: Episode, place: Place, here: Match) -> Place:
@@ -348,7 +349,7 @@ class Belief:
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
             # the robot has left the map: no scan will tell more
             left = waited_enough and place.unseen_s >= LEFT_S
-            taken = (goes_on and p >= sure) or (left and p >= 1.0 - LENIENT * (1.0 - sure))
+            taken = (goes_on and p >= sure and not episode.places.untried) or (left and p >= 1.0 - LENIENT * (1.0 - sure))
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, prediction, writes=left)
         if 1.0 - self._p_off >= sure:

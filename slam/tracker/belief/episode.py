@@ -120,11 +120,13 @@ class Episode:
         """Nats of where motion led and of a place nearby, no farther apart than a scan tells.
 
         What has changed in the room speaks alike against both; they differ by what is confirmed.
+        Against places elsewhere both count what the better of them does.
         """
         ahead = self._odds.config.nearby_per_m * place.gain_m + place.prior
-        return (
-            (min(here, there - ahead), there) if ahead > 0.0 else (here, min(there, here + ahead))
-        )
+        if ahead > 0.0:
+            return min(here, there - ahead), there
+        here = max(here, there)
+        return here, min(there, here + ahead)
 
     def _unknown(self, nearby: float) -> float:
         """Nats of having been carried to nobody knows where; ``nearby``: of the best slip.

@@ -130,13 +130,19 @@ class Places:
         self.followed = [self._waiting(place, prediction) for place in self.followed]
 
     def keep(self, new: list[Place], weight: Callable[[Place], float], hopeless: float) -> None:
-        """Follow the best, one of each place, the longest followed; none that is hopeless."""
-        kept: list[Place] = []
+        """Follow the best, one of each place, the likeliest; none that is hopeless.
+
+        Of two at the same pose the one that was followed longer: it was asked more.
+        """
+        apart: list[Place] = []
         for place in sorted(self.followed + new, key=lambda one: -one.scans):
+            if not any(is_same(place.match, other.match) for other in apart):
+                apart.append(place)
+        kept: list[Place] = []
+        for place in sorted(apart, key=lambda one: -weight(one)):
             at = place.match.T_map_robot
             if not any(other.is_at(at, self._config) for other in kept):
                 kept.append(place)
-        kept.sort(key=lambda one: -weight(one))
         best = weight(kept[0]) if kept else 0.0
         self.followed = [one for one in kept if weight(one) >= best - hopeless][: self._config.most]
 
@@ -187,13 +193,18 @@ class Places:
         self, observations: Observations, match: Match, before: Evidence | None = None
     ) -> Place:
         """A place with what this scan says of it, and those before it: what was said ``before``
-        of where motion led, or, of a place elsewhere, what kept scans say of where it came from.
+        of where motion led, or else what kept scans say of where it came from.
         """
         evidence = Evidence() if before is None else before.copy()
         for seen, motion in self._kept if before is None else ():
             evidence.add(self._cell_map, seen, se2.compose(match.T_map_robot, se2.inverse(motion)))
         evidence.add(self._cell_map, observations, match.T_map_robot)
         return Place(match=match, evidence=evidence)
+
+    @property
+    def untried(self) -> bool:
+        """Whether a search has found places that no scan was asked about."""
+        return bool(self._found)
 
     def _matched(
         self, old: Place, observations: Observations, prediction: Prediction, here: Evidence
