@@ -228,6 +228,8 @@ class Belief:
         start = prediction.T_map_robot
         found = self._matcher.search(cell_map, few, start, loose, window)
         found = self._matcher.climb(cell_map, everyone, found.T_map_robot, start, loose)
+        if is_same(found, match):
+            return
         # the robot may have slipped now, or its motion led it astray some scans ago
         begun = (episode.places.begun(everyone, found, of) for of in (episode.before, None))
         likelier = max(begun, key=lambda place: self._odds.evidence(place.evidence))
@@ -349,7 +351,7 @@ class Belief:
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
             # the robot has left the map: no scan will tell more
             left = waited_enough and place.unseen_s >= LEFT_S
-            taken = (goes_on and p >= sure and not episode.places.untried) or (left and p >= 1.0 - LENIENT * (1.0 - sure))
+            taken = (goes_on and p >= sure) or (left and p >= 1.0 - LENIENT * (1.0 - sure))
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, prediction, writes=left)
         if 1.0 - self._p_off >= sure:

@@ -29,7 +29,7 @@ class BeliefConfig(Settings):
     through_m: float = number(0.53, "m", "d: less than it may be seen through by chance", FITTED,
         low=1e-3)  # fmt: skip
     outdated: float = number(
-        6.0, "nats", "that it costs where the room has changed: the map is outdated here"
+        5.0, "nats", "that it costs where the room has changed: the map is outdated here"
     )
     broken: float = number(
         8.5, "nats", "that it costs if hardly a return goes on from the scans before", low=1e-3

@@ -201,11 +201,6 @@ class Places:
         evidence.add(self._cell_map, observations, match.T_map_robot)
         return Place(match=match, evidence=evidence)
 
-    @property
-    def untried(self) -> bool:
-        """Whether a search has found places that no scan was asked about."""
-        return bool(self._found)
-
     def _matched(
         self, old: Place, observations: Observations, prediction: Prediction, here: Evidence
     ) -> Place:
