@@ -43,13 +43,15 @@ def test_the_moment_about_a_pose_is_that_of_samples() -> None:
 def test_places_that_are_one_are_followed_once_and_hopeless_ones_not() -> None:
     places = Places(known(NETWORK, ROOM, 1.0, ORIGIN), Matcher(CONFIG))
     numbers = CONFIG.tracking.relocalise
-    old = place(0.0, 0.0, scans=5)
-    same = place(0.5 * numbers.same_m, 0.0, 0.5 * numbers.same_rad)
+    beside, best = place(0.0, 0.0, scans=9), place(0.5 * numbers.same_m, 0.0, scans=5)
+    again = place(0.5 * numbers.same_m + 0.01, 0.0)  # the same pose, found anew
     turned = place(0.0, 0.0, 2.0 * numbers.same_rad)
     far, hopeless = place(3.0, 0.0), place(-3.0, 0.0)
-    nats = {id(old): 0.0, id(same): 9.0, id(turned): 2.0, id(far): 5.0, id(hopeless): -50.0}
-    places.keep([same, turned, hopeless, far, old], lambda one: nats[id(one)], 20.0)
-    assert [id(one) for one in places.followed] == [id(far), id(turned), id(old)]
+    nats = {id(beside): 0.0, id(best): 8.0, id(again): 9.0, id(turned): 2.0, id(far): 5.0}
+    nats[id(hopeless)] = -50.0
+    new = [beside, again, turned, hopeless, far, best]
+    places.keep(new, lambda one: nats[id(one)], 20.0)
+    assert [id(one) for one in places.followed] == [id(best), id(far), id(turned)]
     many = [place(float(k), 0.0) for k in range(2 * numbers.most)]
     places.keep(many, lambda one: float(one.match.T_map_robot[0]), 1e6)
     assert len(places.followed) == numbers.most
