@@ -58,6 +58,8 @@ class TrackerConfig(Settings):
         "standing.doubtful_m": "standing.alert_m",
         "standing.long_window_s": "standing.window_s",
         "belief.searches": "belief.searched",
+        "belief.through_per_m": "belief.through",
+        "belief.changed_per_m": "belief.through",
     }
     constants: ClassVar[Mapping[str, str]] = {
         "frontend": "slam.frontend.observations",

@@ -24,7 +24,7 @@ class BeliefConfig(Settings):
         6.0, "m", "of surface from which on it counts a metre alike: more than one view shows"
     )
     through: float = number(
-        2.8, "nats", "e: of long-known surface D that they see through, - e log(1 + D / d)", FITTED
+        2.8, "nats", "b: of long-known surface D that they see through, - b log(1 + D / d)", FITTED
     )
     through_m: float = number(0.53, "m", "d: less than it may be seen through by chance", FITTED,
         low=1e-3)  # fmt: skip
