@@ -2,13 +2,16 @@
 """The covariance of a pose that may be at several places, and where they are followed."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
+import pytest
 
 from slam.frontend.odometry_prior import Prediction
-from slam.tracker.belief.episode import second_moment
+from slam.tracker.belief.episode import Episode, second_moment
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places
+from slam.tracker.belief.posterior import Odds
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.matcher import Matcher, unmatched
 from tests.slam.tracker.belief.rooms import CONFIGS, KINDS, ORIGIN, known, seen
@@ -56,6 +59,22 @@ def test_places_that_are_one_are_followed_once_and_hopeless_ones_not() -> None:
     places.keep(many, lambda one: float(one.match.T_map_robot[0]), 1e6)
     assert len(places.followed) == numbers.most
     assert places.followed[0] is many[-1]
+
+
+def test_a_place_a_hand_away_speaks_for_the_motion_against_places_elsewhere() -> None:
+    """The motion led a little off, and sees through much: what explains that is next to it."""
+    odds = Odds(CONFIG.belief, CONFIG.carried_per_h)
+    episode = Episode(known(NETWORK, ROOM, 1.0, ORIGIN), Matcher(CONFIG), odds, 0.1)
+    near, elsewhere = place(0.2, 0.0), place(5.0, 0.0)
+    near.evidence.known_m = elsewhere.evidence.known_m = 8.0
+    episode.evidence.through_m = 20.0
+    slip = 0.5 * episode.carried_there
+    episode.places.followed = [replace(near, prior=slip), elsewhere]
+    of = episode.weighed()
+    assert of.followed > 0.99
+    assert math.log(of.places[0] / of.followed) == pytest.approx(slip)  # it confirms no more
+    episode.places.followed = [elsewhere]
+    assert episode.weighed().places[0] > 100.0 * episode.weighed().followed
 
 
 def test_a_place_is_carried_on_by_odometry_and_matched_to_the_scan() -> None:
