@@ -34,7 +34,7 @@ class Odds:
         return self._carried_per_h > 0.0
 
     def evidence(self, of: Evidence | Look) -> float:
-        """Nats for a place: a log(1 + C / c) - b log(1 + D / d)."""
+        """Nats for a place: a log(1 + C / c) - b log(1 + D / n)."""
         config = self.config
         known, through = (of.known, of.through) if isinstance(of, Look) else (
             of.known_m, of.through_m
