@@ -41,6 +41,7 @@ STEP_M = 0.02  # m, deviation of the motion between two scans
 STEP_RAD = 0.01  # rad, the same of the turn
 BUFFER = 200  # scans, kept to be merged when the place is found
 BUFFER_M, BUFFER_RAD = 0.1, 0.15  # m driven or rad turned between two of them
+MOST_CHANGED = 10.0  # most that ``outdated`` counts, in units of ``through``
 ASKED = 20  # scans of those kept, evenly taken, that a place found late is asked for
 AGREED = 0.75  # share of the usual match, in a map without days, of those asked
 FITS = 0.5  # share of the scans after the find that must be tracked
@@ -177,7 +178,8 @@ def changed(belief: BeliefConfig) -> BeliefConfig:
     """The numbers for a room that has changed: all places pay ``outdated`` alike, and what is seen
     through costs from there on.
     """
-    return replace(belief, through_m=belief.through_m * math.exp(belief.outdated / belief.through))
+    more = math.exp(min(belief.outdated / belief.through, MOST_CHANGED))
+    return replace(belief, through_m=belief.through_m * more)
 
 
 class StartSearch:

@@ -36,7 +36,7 @@ from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 from slam.tracker.tracker import Tracker
 
 OCTOMAP = "Hornung et al. 2013"
-SURE = 0.45  # as of ``network``: traces of the same walls are 1.7 times as high here
+SURE = 0.45  # as of ``network``: traces of the same walls are higher here
 
 
 @dataclass(frozen=True, kw_only=True)

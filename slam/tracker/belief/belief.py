@@ -231,7 +231,9 @@ class Belief:
         if is_same(found, match):
             return
         # the robot may have slipped now, or its motion led it astray some scans ago
-        begun = (episode.places.begun(everyone, found, of) for of in (episode.before, None))
+        first = episode.elapsed_s <= prediction.elapsed  # of the episode: no scans are kept
+        of = (episode.before,) if first else (episode.before, None)
+        begun = [episode.places.begun(everyone, found, before) for before in of]
         likelier = max(begun, key=lambda place: self._odds.evidence(place.evidence))
         place = self._told_nearby(episode, likelier, match)
         episode.places.keep([place], episode.weight, self._config.hopeless)

@@ -24,12 +24,16 @@ class BeliefConfig(Settings):
         6.0, "m", "of surface from which on it counts a metre alike: more than one view shows"
     )
     through: float = number(
-        2.8, "nats", "b: of long-known surface D that they see through, - b log(1 + D / n)", FITTED
-    )
+        2.8, "nats", "b: of long-known surface D that they see through, - b log(1 + D / n)", FITTED,
+        low=1e-3,
+    )  # fmt: skip
     through_m: float = number(0.53, "m", "n: less than it may be seen through by chance", FITTED,
         low=1e-3)  # fmt: skip
     outdated: float = number(
-        5.0, "nats", "that it costs where the room has changed: the map is outdated here"
+        5.0,
+        "nats",
+        "that it costs where the room has changed: the map is outdated here; a start in a known "
+        "map pays it anyhow",
     )
     broken: float = number(
         8.5, "nats", "that it costs if hardly a return goes on from the scans before", low=1e-3

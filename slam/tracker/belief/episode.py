@@ -110,23 +110,25 @@ class Episode:
         weights = [self.weight(place) for place in places]
         here = self._odds.evidence(self.evidence) - self.broken
         slipped = [k for k, place in enumerate(places) if place.prior > self.carried_there]
-        for k in slipped:
-            here, weights[k] = self._compared(places[k], here, weights[k])
+        here = self._compared(slipped, here, weights)
         nearby = max((weights[k] for k in slipped), default=-MOST_NATS)
         of_here, unknown, *others = probabilities([here, self._unknown(nearby), *weights])
         return Weighed(followed=of_here, places=others, unknown=unknown)
 
-    def _compared(self, place: Place, here: float, there: float) -> tuple[float, float]:
-        """Nats of where motion led and of a place nearby, no farther apart than a scan tells.
+    def _compared(self, nearby: list[int], here: float, weights: list[float]) -> float:
+        """Nats of where motion led; ``weights`` of places ``nearby`` change with it.
 
         What has changed in the room speaks alike against both; they differ by what is confirmed.
-        Against places elsewhere both count what the better of them does.
+        A place that leads by that leads by as much at least. To others it lends what it weighs:
+        where motion led weighs as much as the best of them, and they lag by as much at least.
         """
-        ahead = self._odds.config.nearby_per_m * place.gain_m + place.prior
-        if ahead > 0.0:
-            return min(here, there - ahead), there
-        here = max(here, there)
-        return here, min(there, here + ahead)
+        places, k_nats = self.places.followed, self._odds.config.nearby_per_m
+        ahead = {k: k_nats * places[k].gain_m + places[k].prior for k in nearby}
+        behind = [k for k in nearby if ahead[k] <= 0.0]
+        here = max([here, *(weights[k] for k in behind)])
+        for k in behind:
+            weights[k] = min(weights[k], here + ahead[k])
+        return min([here, *(weights[k] - ahead[k] for k in nearby if ahead[k] > 0.0)])
 
     def _unknown(self, nearby: float) -> float:
         """Nats of having been carried to nobody knows where; ``nearby``: of the best slip.

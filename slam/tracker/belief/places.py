@@ -132,7 +132,7 @@ class Places:
     def keep(self, new: list[Place], weight: Callable[[Place], float], hopeless: float) -> None:
         """Follow the best, one of each place, the likeliest; none that is hopeless.
 
-        Of two at the same pose the one that was followed longer: it was asked more.
+        Of places at the same pose, the one that more scans were asked of.
         """
         apart: list[Place] = []
         for place in sorted(self.followed + new, key=lambda one: -one.scans):

@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("53b5202c61e0", "b84b650044cf")),
-        (OccupancyConfig, ["grid"], ("47c0fbabebf5", "005b1430af2a")),
+        (ShuntingConfig, [], ("7bfc103e289f", "b278f96e37df")),
+        (OccupancyConfig, ["grid"], ("d8a63e0c4d5c", "ba6a95f446b3")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
@@ -38,6 +38,8 @@ def test_a_tree_keeps_its_paths_its_order_and_its_digest(
         ("tracking.quality.give_up_s", "tracking.give_up_s"),
         ("standing.doubtful_m", "standing.alert_m"),
         ("standing.long_window_s", "standing.window_s"),
+        ("belief.through_per_m", "belief.through"),
+        ("belief.changed_per_m", "belief.through"),
     ],
 )
 def test_a_number_that_is_gone_is_refused_by_the_name_of_what_took_its_place(

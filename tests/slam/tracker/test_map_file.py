@@ -232,6 +232,7 @@ def test_a_map_of_before_one_belief_is_read(
     config["standing"] |= {
         "fallen": 0.8, "rival_scans": 3, "undecided_s": 2.0, "long_window_s": 8.0,
     }  # fmt: skip
+    config["belief"] = {"through_per_m": 3.0, "changed_per_m": 0.64}
     config["tracking"] |= {
         "quality": {"lost_after": 3, "give_up_s": 60.0}, "verdict": {"even": 0.45, "steep": 20.0},
     }  # fmt: skip

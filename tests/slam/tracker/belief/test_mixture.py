@@ -73,6 +73,14 @@ def test_a_place_a_hand_away_speaks_for_the_motion_against_places_elsewhere() ->
     of = episode.weighed()
     assert of.followed > 0.99
     assert math.log(of.places[0] / of.followed) == pytest.approx(slip)  # it confirms no more
+    leads = replace(place(0.3, 0.0), evidence=near.evidence, prior=slip, gain_m=2.0)
+    both = [replace(near, prior=slip), leads]
+    said = []
+    for episode.places.followed in (both, both[::-1]):  # in no order
+        one = episode.weighed()
+        assert one.followed < 0.01 < max(one.places)
+        said.append(sorted(one.places))
+    np.testing.assert_allclose(said[0], said[1])
     episode.places.followed = [elsewhere]
     assert episode.weighed().places[0] > 100.0 * episode.weighed().followed
 
