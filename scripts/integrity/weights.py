@@ -20,7 +20,7 @@ from slam.evaluation.statistics import central_interval
 from slam.frames import Float
 from slam.tracker.belief.config import BeliefConfig
 
-JOINT = ("confirmed", "confirmed_m", "through", "through_m", "place")
+JOINT = ("confirmed", "confirmed_m", "through", "place")
 FIXED = ("linear_m",)  # of the evidence, too; set by hand
 ALONE = ("nearby_per_m", "searched", "broken")
 SCANS = 500.0  # that all labels together count, against the prior of ``SPREAD``
@@ -90,7 +90,7 @@ def evidence(values: Values, known: Float, through: Float) -> Float:
     """Nats for places, as ``slam.tracker.belief.posterior.Odds.evidence`` (a test holds that)."""
     chance, one_view = values["confirmed_m"], np.minimum(known, values["linear_m"])
     more = np.log1p(one_view / chance) + (known - one_view) / (chance + one_view)
-    denied = values["through"] * np.log1p(through / values["through_m"])
+    denied = values["through"] * np.sqrt(through)
     return np.asarray(values["confirmed"] * more - denied)
 
 

@@ -27,7 +27,7 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
-from slam.tracker.belief.config import LENIENT, BeliefConfig
+from slam.tracker.belief.config import LENIENT
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse, spread
 from slam.tracker.belief.posterior import Odds, probabilities
@@ -41,7 +41,6 @@ STEP_M = 0.02  # m, deviation of the motion between two scans
 STEP_RAD = 0.01  # rad, the same of the turn
 BUFFER = 200  # scans, kept to be merged when the place is found
 BUFFER_M, BUFFER_RAD = 0.1, 0.15  # m driven or rad turned between two of them
-MOST_CHANGED = 10.0  # most that ``outdated`` counts, in units of ``through``
 ASKED = 20  # scans of those kept, evenly taken, that a place found late is asked for
 AGREED = 0.75  # share of the usual match, in a map without days, of those asked
 FITS = 0.5  # share of the scans after the find that must be tracked
@@ -174,14 +173,6 @@ class Start:
     probability: float
 
 
-def changed(belief: BeliefConfig) -> BeliefConfig:
-    """The numbers for a room that has changed: all places pay ``outdated`` alike, and what is seen
-    through costs from there on.
-    """
-    more = math.exp(min(belief.outdated / belief.through, MOST_CHANGED))
-    return replace(belief, through_m=belief.through_m * more)
-
-
 class StartSearch:
     """Maps alone and searches the known map, until the start is found.
 
@@ -193,7 +184,7 @@ class StartSearch:
         self._known, self._past = known, past
         numbers = known.config
         self._belief, self._budget = numbers.belief, numbers.matching.budget
-        self._odds = Odds(changed(numbers.belief), numbers.carried_per_h)
+        self._odds = Odds(numbers.belief, numbers.carried_per_h, changed=True)
         self._prior = -numbers.belief.place - numbers.belief.outdated
         self.seen: list[tuple[Frame, Float]] = []
         self.alone = type(known)(numbers)

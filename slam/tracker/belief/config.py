@@ -24,11 +24,9 @@ class BeliefConfig(Settings):
         6.0, "m", "of surface from which on it counts a metre alike: more than one view shows"
     )
     through: float = number(
-        2.8, "nats", "b: of long-known surface D that they see through, - b log(1 + D / n)", FITTED,
+        3.2, "nats", "b: of long-known surface D m that they see through, - b sqrt(D)", FITTED,
         low=1e-3,
     )  # fmt: skip
-    through_m: float = number(0.53, "m", "n: less than it may be seen through by chance", FITTED,
-        low=1e-3)  # fmt: skip
     outdated: float = number(
         5.0,
         "nats",

@@ -22,10 +22,14 @@ class Odds:
     """The equations, with their numbers.
 
     carried_per_h  how often the robot is carried elsewhere; 0: never
+    changed        the room has: all places have paid ``outdated``, and D counts from there on
     """
 
-    def __init__(self, config: BeliefConfig, carried_per_h: float) -> None:
+    def __init__(
+        self, config: BeliefConfig, carried_per_h: float, *, changed: bool = False
+    ) -> None:
         self.config, self._carried_per_h = config, carried_per_h
+        self._changed_m = (config.outdated / config.through) ** 2 if changed else 0.0
         self._pulled = np.diag([config.pulled_m**2, config.pulled_m**2, config.pulled_rad**2])
 
     @property
@@ -34,7 +38,7 @@ class Odds:
         return self._carried_per_h > 0.0
 
     def evidence(self, of: Evidence | Look) -> float:
-        """Nats for a place: a log(1 + C / c) - b log(1 + D / n)."""
+        """Nats for a place: a log(1 + C / c) - b sqrt(D)."""
         config = self.config
         known, through = (of.known, of.through) if isinstance(of, Look) else (
             of.known_m, of.through_m
@@ -44,10 +48,9 @@ class Odds:
         return config.confirmed * more - self.denied(through)
 
     def denied(self, through_m: float) -> float:
-        """Nats against a place: a metre more says less than the one before, in a room that has
-        changed, too.
-        """
-        return self.config.through * math.log1p(through_m / self.config.through_m)
+        """Nats against a place: a metre more says less than the one before."""
+        before_m = self._changed_m
+        return self.config.through * (math.sqrt(before_m + through_m) - math.sqrt(before_m))
 
     def broken(self, share: float, vanished: float = 0.0) -> float:
         """Nats against a place where so much of the usual match goes on from the scans before, and

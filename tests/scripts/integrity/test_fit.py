@@ -21,12 +21,10 @@ from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.posterior import Odds
 
 TRUE = {
-    "confirmed": 4.0, "confirmed_m": 0.6, "through": 3.0, "through_m": 0.5,
-    "place": 3.0, "linear_m": 5.0,
+    "confirmed": 4.0, "confirmed_m": 0.6, "through": 3.0, "place": 3.0, "linear_m": 5.0,
 }  # fmt: skip
 START = {
-    "confirmed": 7.0, "confirmed_m": 1.2, "through": 6.0, "through_m": 1.0,
-    "place": 5.0, "linear_m": 5.0,
+    "confirmed": 7.0, "confirmed_m": 1.2, "through": 6.0, "place": 5.0, "linear_m": 5.0,
 }  # fmt: skip
 
 

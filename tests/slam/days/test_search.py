@@ -2,7 +2,6 @@
 """Where a session starts: one belief weighs all places; and whether what it saw fits the past."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,9 +9,8 @@ import pytest
 from slam import se2
 from slam.days.evidence import Snapshot
 from slam.days.history import History
-from slam.days.search import KNOWN, SPOILS, Agreement, Past, StartSearch, changed
+from slam.days.search import KNOWN, SPOILS, Agreement, Past, StartSearch
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.tracker.belief.posterior import Odds
 from tests.world2d import Drive, World2D, frames, laser, rectangle, wander
 
 CONFIG = ShuntingConfig(cell_m=0.05, trace_s=2.5)
@@ -27,18 +25,6 @@ def mapped(*parts) -> ShuntingSlam:
     for frame in frames(World2D(np.vstack(parts)), wander(16.0), rate_hz=5.0, spec=laser(181)):
         slam.update(frame.without_truth())
     return slam
-
-
-@pytest.mark.parametrize("numbers", [{}, {"through": 1e-3}, {"outdated": 500.0}])
-def test_a_room_that_has_changed_has_paid_for_it(numbers) -> None:
-    """Far off, what is seen through costs ``outdated`` less; next to nothing costs nothing."""
-    belief = replace(CONFIG.belief, **numbers)
-    now, then = Odds(belief, 1.0), Odds(changed(belief), 1.0)
-    assert then.denied(0.0) == 0.0
-    assert all(then.denied(d) < now.denied(d) for d in (0.1, 1.0, 10.0))
-    if not numbers:
-        paid = now.denied(1e6) - then.denied(1e6)
-        assert paid == pytest.approx(belief.outdated, rel=1e-3)
 
 
 def searched(known, world, drive):

@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("7bfc103e289f", "b278f96e37df")),
-        (OccupancyConfig, ["grid"], ("d8a63e0c4d5c", "ba6a95f446b3")),
+        (ShuntingConfig, [], ("2c227f43c27f", "14b747354da5")),
+        (OccupancyConfig, ["grid"], ("0dc4d33541b1", "cf7f5f21d5f6")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

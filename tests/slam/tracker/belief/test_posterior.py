@@ -69,10 +69,20 @@ def test_what_is_seen_through_costs_ever_less() -> None:
     prices = np.array([ODDS.denied(0.1 * k) for k in range(1000)])
     assert (np.diff(prices) > 0.0).all()
     assert (np.diff(prices, 2) < 0.0).all()
-    first = CONFIG.through / CONFIG.through_m  # nats a metre
-    assert ODDS.denied(1e-6) == pytest.approx(1e-6 * first, rel=1e-3)
-    doubled = ODDS.denied(2000.0) - ODDS.denied(1000.0)
-    assert doubled == pytest.approx(CONFIG.through * math.log(2.0), rel=1e-3)
+    assert ODDS.denied(4.0) == pytest.approx(2.0 * CONFIG.through)
+    assert ODDS.denied(400.0) == pytest.approx(20.0 * CONFIG.through)
+
+
+@pytest.mark.parametrize("numbers", [{}, {"through": 1e-3}, {"outdated": 500.0}])
+def test_in_a_room_that_has_changed_the_first_metres_are_paid(numbers: dict[str, float]) -> None:
+    belief = replace(CONFIG, **numbers)
+    now, then = Odds(belief, 1.0), Odds(belief, 1.0, changed=True)
+    paid_m = (belief.outdated / belief.through) ** 2
+    assert then.denied(0.0) == 0.0
+    for through_m in (0.1, 1.0, 10.0):
+        told = now.denied(paid_m + through_m) - belief.outdated
+        assert then.denied(through_m) == pytest.approx(told, abs=1e-6)
+        assert then.denied(through_m) < now.denied(through_m)
 
 
 def test_a_scan_and_many_weigh_by_the_same_law() -> None:
