@@ -36,7 +36,7 @@ from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 from slam.tracker.tracker import Tracker
 
 OCTOMAP = "Hornung et al. 2013"
-SURE = 0.45  # share, w of a cell that counts whole when it is seen through; by hand, as ``network``'s
+SURE = 0.45  # share: w of a cell that counts whole when it is seen through; by hand
 
 
 @dataclass(frozen=True, kw_only=True)

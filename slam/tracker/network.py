@@ -34,7 +34,7 @@ from slam.tracker.cells import (
 from slam.tracker.config import TrackerConfig
 
 # w, known share of a trace, at which a cell that is seen through counts whole. It sets the unit of
-# D, so that D of a wall in a room of some minutes is near its length; long known ones count more. By hand
+# D: a wall in a room of some minutes counts about its length, one known for long more. By hand
 SURE = 0.35
 
 
