@@ -36,7 +36,7 @@ from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 from slam.tracker.tracker import Tracker
 
 OCTOMAP = "Hornung et al. 2013"
-SURE = 0.45  # share: w of a cell that counts whole when it is seen through; by hand
+SURE = 0.65  # share: w of a cell that counts whole when it is seen through; by hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -158,7 +158,7 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
                         log_odds[slot, jj, ii] = now
                         cells.age[slot, jj, ii] += step
                         cells.y[slot, jj, ii] = max(math.tanh(0.5 * now), 0.0)
-    return Look(confirmed, contradicted, visited, known * cell, through * cell / SURE**2)
+    return Look(confirmed, contradicted, visited, known * cell, through * cell / SURE**3)
 
 
 @njit

@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner
+from slam.frontend.surfaces import FACES
 from slam.frontend.visibility import View
 
 SIDE = 8  # cells along a block's edge
@@ -66,9 +67,9 @@ class Look(NamedTuple):
     visited       cells that it says something of
     known         m of long-known surface that it confirms: a trace y that was looked at for ``age``
                   s counts w = y age / (age + known_s)
-    through       m of it that it sees through: (w / ``SURE`` of the map)^2. What was there in few
-                  of the looks was no wall, and need not be there now. Of both, what was
-                  ``counted`` before counts by what is more of it now
+    through       m of it that it sees through: (w c / ``SURE`` of the map)^3, c as of ``crossed``.
+                  What was there in few of the looks was no wall, and need not be there now. Of
+                  both, what was ``counted`` before counts by what is more of it now
     """
 
     confirmed: float
@@ -80,6 +81,7 @@ class Look(NamedTuple):
 
 ANEW = np.zeros((2, 0, SIDE, SIDE), np.uint8)  # nothing was counted, and nothing is kept of it
 WHOLE = 255.0  # of a cell that is counted
+LEAST_M = 1e-6  # of a beam that has a direction
 KNOWN, THROUGH = 0, 1  # kinds of what is counted
 
 
@@ -89,10 +91,23 @@ def uncounted(cells: Cells) -> NDArray[np.uint8]:
 
 
 @inner
+def crossed(facing: int, x: float, y: float) -> float:
+    """Cosine of the angle at which a beam of direction (x, y), map axes, meets a surface; 1 where
+    the way it faces is unknown.
+
+    A beam along a wall passes through metres of it where the pose is off by centimetres.
+    """
+    if facing == 0:
+        return 1.0
+    way = math.tau / FACES * (facing & (FACES - 1))
+    return abs(x * math.cos(way) + y * math.sin(way)) / max(math.sqrt(x * x + y * y), LEAST_M)
+
+
+@inner
 def fresh(  # noqa: PLR0913 (kernel)
     counted: NDArray[np.uint8], once: bool, kind: int, slot: int, j: int, i: int, weight: float
 ) -> float:
-    """What of a weight in [0, 1] was not counted before; it is now. Its square if seen through."""
+    """What of a weight in [0, 1] was not counted before; it is now. Its cube if seen through."""
     before = 0.0
     if once:
         now, earlier = np.uint8(WHOLE * weight + 0.5), counted[kind, slot, j, i]
@@ -102,7 +117,7 @@ def fresh(  # noqa: PLR0913 (kernel)
         if kind == KNOWN:
             return (float(now) - float(earlier)) / WHOLE
         weight, before = float(now) / WHOLE, float(earlier) / WHOLE
-    return weight if kind == KNOWN else weight * weight - before * before
+    return weight if kind == KNOWN else weight**3 - before**3
 
 
 def no_cells(slots: int = FIRST, scratch: int = FIRST) -> Cells:

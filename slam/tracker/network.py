@@ -26,6 +26,7 @@ from slam.tracker.cells import (
     THROUGH,
     Cells,
     Look,
+    crossed,
     fresh,
     in_reach,
     named,
@@ -145,6 +146,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                         weight = (
                             y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
                         )
+                        weight *= crossed(cells.facing[slot, jj, ii], px, py)
                         through += fresh(counted, once, THROUGH, slot, jj, ii, weight)
                     elif not behind:
                         confirmed += y * given
@@ -182,7 +184,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                 cells.counts[FREE_COUNT] += 1
     if write:
         released(cells)
-    return Look(confirmed, contradicted, visited, known * cell, through * cell / SURE**2)
+    return Look(confirmed, contradicted, visited, known * cell, through * cell / SURE**3)
 
 
 class Network(CellMap):

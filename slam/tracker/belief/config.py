@@ -24,7 +24,7 @@ class BeliefConfig(Settings):
         6.0, "m", "of surface from which on it counts a metre alike: more than one view shows"
     )
     through: float = number(
-        3.2, "nats", "b: of long-known surface D m that they see through, - b sqrt(D)", FITTED,
+        4.9, "nats", "b: of long-known surface D m that they see through, - b sqrt(D)", FITTED,
         low=1e-3,
     )  # fmt: skip
     outdated: float = number(

@@ -9,6 +9,7 @@ import pytest
 from slam import se2
 from slam.tracker.belief.evidence import Evidence, vanished
 from slam.tracker.cell_map import CellMap
+from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from tests.slam.tracker.belief.rooms import KINDS, ORIGIN, known, seen
 from tests.world2d import World2D, arena, rectangle
@@ -69,7 +70,7 @@ def test_what_has_gone_is_seen_through_by_its_length(kind: Kind) -> None:
     assert gone_m[1] == pytest.approx(2.0 * gone_m[0], rel=0.2)
 
 
-def test_what_was_hardly_known_counts_by_its_square_when_it_is_gone(kind: Kind) -> None:
+def test_what_was_hardly_known_counts_by_its_cube_when_it_is_gone(kind: Kind) -> None:
     """People stand about for a while, all over a hall: none of that tells that it is another."""
     kept_m, gone_m = [], []
     for seconds in (2.0, 60.0):
@@ -80,7 +81,7 @@ def test_what_was_hardly_known_counts_by_its_square_when_it_is_gone(kind: Kind) 
             of.append(evidence.known_m if world is FURNISHED else evidence.through_m)
     share = kept_m[0] / kept_m[1]
     assert 0.1 < share < 0.5
-    assert gone_m[0] / gone_m[1] == pytest.approx(share**2, rel=0.25)
+    assert gone_m[0] / gone_m[1] == pytest.approx(share**3, rel=0.35)
 
 
 def test_a_wrong_pose_is_denied_and_the_right_one_is_not(kind: Kind) -> None:
@@ -167,3 +168,16 @@ def test_surface_vanishes_for_who_was_carried_not_behind_a_board_nor_for_who_dro
     assert vanished(cell_map, before, (seen(BOARD, ORIGIN, kind), ORIGIN)) < 0.02
     carried = np.array([-1.0, 1.2, 2.0])
     assert vanished(cell_map, before, (seen(FURNISHED, carried, kind), ORIGIN)) > 0.2
+
+
+def test_a_wall_seen_through_along_it_counts_little(kind: Kind) -> None:
+    """A pose that is off by centimetres looks along metres of a wall."""
+    wall = World2D(np.vstack([arena(), rectangle(0.0, 1.0, 3.0, 1.1)]))
+    cell_map = known(kind, wall, 60.0, np.array([1.5, -1.0, 0.5 * math.pi]))
+    aside, along = Evidence(), Evidence()
+    for evidence, pose in ((aside, (1.5, -0.5, 0.5 * math.pi)), (along, (-1.0, 1.0, 0.0))):
+        at = np.array(pose)
+        evidence.add(cell_map, seen(FREE, at, kind), at)
+    assert aside.through_m > 2.0
+    # the grid does not know which way its surfaces face
+    assert along.through_m / aside.through_m < 0.1 or kind is not Network

@@ -37,8 +37,8 @@ def furnished(shift: float) -> World2D:
 
 
 def posts(dx: float = 0.0, dy: float = 0.0) -> World2D:
-    """Six posts with nothing behind them, moved by so much."""
-    corners = [(2.0, 0.0), (0.5, 1.8), (1.0, -1.5), (-2.0, 0.3), (-1.0, 1.6), (-0.6, -2.0)]
+    """Four posts with nothing behind them, moved by so much."""
+    corners = [(2.0, 0.0), (0.5, 1.8), (-2.0, 0.3), (-0.6, -2.0)]
     boxes = [rectangle(x + dx, y + dy, x + dx + 0.2, y + dy + 0.2) for x, y in corners]
     return World2D(np.vstack(boxes))
 

@@ -179,7 +179,8 @@ def test_in_a_symmetric_room_dead_reckoning_says_which_of_two_places() -> None:
     hall = World2D(rectangle(-5.0, -3.0, 5.0, 3.0))
     system, last = mapped(hall)
     pose = at(system)
-    elsewhere = World2D(rectangle(-7.0, -9.0, 8.0, 6.0))  # mirrors, say
+    corners = np.array([(-8.0, -7.0), (9.0, -10.0), (12.0, 5.0), (0.0, 11.0), (-9.0, 6.0)])
+    elsewhere = World2D(np.hstack([corners, np.roll(corners, 1, axis=0)]))  # mirrors, say
     hidden = going_on(still(elsewhere, pose, 1.4), last)
     told(system, hidden)
     said = told(system, going_on(still(hall, pose, 4.0), hidden[-1]))
@@ -204,7 +205,7 @@ def test_who_leaves_the_map_in_doubt_is_believed_after_a_while(
     parts = (-5.0, -2.0, 60.0, 2.0), (-3.0, 1.0, -2.2, 1.6), (2.0, -1.8, 3.2, -1.2)
     hall = World2D(np.vstack([rectangle(*part) for part in (*parts, (5.0, 1.2, 5.6, 2.0))]))
     short = laser(181, range_max=8.0)  # m; the map ends there
-    numbers = {"belief.frozen_above": 1e-3, "tracking.give_up_s": give_up_s}
+    numbers = {"belief.frozen_above": 1e-4, "tracking.give_up_s": give_up_s}
     system = ShuntingSlam(FAST.changed(numbers))
     stream = frames(hall, TURN, rate_hz=5.0, seed=3, spec=short)
     told(system, stream)
