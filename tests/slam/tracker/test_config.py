@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("96e8f9e138f2", "14b747354da5")),
-        (OccupancyConfig, ["grid"], ("856be25d755a", "cf7f5f21d5f6")),
+        (ShuntingConfig, [], ("96e8f9e138f2", "f4935888eab7")),
+        (OccupancyConfig, ["grid"], ("856be25d755a", "43a596e5d5b8")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
