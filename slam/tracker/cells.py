@@ -67,7 +67,7 @@ class Look(NamedTuple):
     visited       cells that it says something of
     known         m of long-known surface that it confirms: a trace y that was looked at for ``age``
                   s counts w = y age / (age + known_s)
-    through       m of it that it sees through: (w c / ``SURE`` of the map)^3, c as of ``crossed``.
+    through       the same that it sees through, (w c / ``SURE`` of the map)^3, c as of ``crossed``.
                   What was there in few of the looks was no wall, and need not be there now. Of
                   both, what was ``counted`` before counts by what is more of it now
     """
@@ -92,8 +92,8 @@ def uncounted(cells: Cells) -> NDArray[np.uint8]:
 
 @inner
 def crossed(facing: int, x: float, y: float) -> float:
-    """Cosine of the angle at which a beam of direction (x, y), map axes, meets a surface; 1 where
-    the way it faces is unknown.
+    """Cosine of the angle of incidence (1: head on) of a beam of direction (x, y), map axes; 1
+    where the way a surface faces is unknown.
 
     A beam along a wall passes through metres of it where the pose is off by centimetres.
     """
@@ -107,7 +107,7 @@ def crossed(facing: int, x: float, y: float) -> float:
 def fresh(  # noqa: PLR0913 (kernel)
     counted: NDArray[np.uint8], once: bool, kind: int, slot: int, j: int, i: int, weight: float
 ) -> float:
-    """What of a weight in [0, 1] was not counted before; it is now. Its cube if seen through."""
+    """What of a weight in [0, 1] was not counted before; it is now. Of cubes if seen through."""
     before = 0.0
     if once:
         now, earlier = np.uint8(WHOLE * weight + 0.5), counted[kind, slot, j, i]

@@ -34,8 +34,8 @@ from slam.tracker.cells import (
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
 
-# w, known share of a trace, at which a cell that is seen through counts whole. It sets the unit of
-# D: a wall in a room of some minutes counts about its length, one known for long more. By hand
+# w c (``cells.Look``) at which a cell that is seen through counts whole; a surer one counts more.
+# It sets the unit of D. By hand
 SURE = 0.35
 
 

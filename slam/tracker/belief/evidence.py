@@ -21,7 +21,7 @@ class Evidence:
     """Of one place, on a map that is not written meanwhile.
 
     known_m    m of long-known surface that scans confirmed
-    through_m  m of it that they saw through
+    through_m  the same that they saw through, as ``cells.Look`` counts it
     latest_m   m of trace that the latest scan confirms, counted before or not
     """
 
@@ -64,7 +64,7 @@ def vanished(
 ) -> float:
     """Share of the long-known surface that a scan confirms and the next sees through, by pose.
 
-    Of what the next confirms or sees through: what is hidden from it says nothing. What stands does
+    Of what the next confirms or sees through (that by w c): what is hidden from it says nothing. What stands does
     not vanish from one scan to the next, and what moves has moved little: next to nothing at right
     poses, and nearly all after a robot was carried elsewhere.
     """

@@ -176,6 +176,7 @@ def test_a_place_nearby_is_only_looked_for_where_old_surface_shows_it(
 
 
 def test_in_a_symmetric_room_dead_reckoning_says_which_of_two_places() -> None:
+    """Where what was seen meanwhile fits the map nowhere."""
     hall = World2D(rectangle(-5.0, -3.0, 5.0, 3.0))
     system, last = mapped(hall)
     pose = at(system)
@@ -185,7 +186,7 @@ def test_in_a_symmetric_room_dead_reckoning_says_which_of_two_places() -> None:
     told(system, hidden)
     said = told(system, going_on(still(hall, pose, 4.0), hidden[-1]))
     assert "relocated" not in states(said)
-    np.testing.assert_allclose(system.trajectory().poses[-1], pose, atol=0.03)
+    assert all(off_m(one, pose) < 0.03 for one in said)
 
 
 def test_a_robot_carried_to_one_of_two_places_alike_does_not_guess() -> None:
@@ -205,6 +206,7 @@ def test_who_leaves_the_map_in_doubt_is_believed_after_a_while(
     parts = (-5.0, -2.0, 60.0, 2.0), (-3.0, 1.0, -2.2, 1.6), (2.0, -1.8, 3.2, -1.2)
     hall = World2D(np.vstack([rectangle(*part) for part in (*parts, (5.0, 1.2, 5.6, 2.0))]))
     short = laser(181, range_max=8.0)  # m; the map ends there
+    # so that the doubt lasts until the map is left
     numbers = {"belief.frozen_above": 1e-4, "tracking.give_up_s": give_up_s}
     system = ShuntingSlam(FAST.changed(numbers))
     stream = frames(hall, TURN, rate_hz=5.0, seed=3, spec=short)
