@@ -260,11 +260,9 @@ class Tracker(abc.ABC):
         sure, belief = self._pose_covariance, self._belief
         self._before, self._T_map_robot = frame.odometry, match.T_map_robot
         T_map_robot = match.T_map_robot if elsewhere is None else elsewhere
-        alert_m = self.config.standing.alert_m
         p_lost = 1.0 - (1.0 - belief.p_lost) * (1.0 - sure.p_off)
         lost = p_lost >= 0.5 and belief.status is not Status.BLIND
-        doubtful = 0.0 < alert_m < 3.0 * sure.by_movers_m
-        doubtful |= p_lost > self.config.belief.frozen_above
+        doubtful = p_lost > self.config.belief.frozen_above
         self._path.add(frame.stamp_ns, match.T_map_robot, elsewhere)
         covariance = sure.covariance + belief.spread_about(T_map_robot, self._loops.anywhere)
         return Estimate(

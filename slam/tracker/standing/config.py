@@ -54,8 +54,8 @@ class StandingConfig(Settings):
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
     alert_m: float = number(
-        0.5, "m", "a position off by more is wrong: not converged where movers may have carried "
-        "it so far, by 3 σ; 0: never asked", "the alert limit of docs/integrity.md",
+        0.5, "m", "a position off by more is wrong: the probability that movers carried it so far "
+        "is part of p_lost; 0: never asked", "the alert limit of docs/integrity.md",
     )  # fmt: skip
 
 

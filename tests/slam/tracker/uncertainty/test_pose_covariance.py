@@ -442,10 +442,10 @@ def test_a_pose_that_movers_may_have_carried_beyond_the_alert_limit_is_not_belie
     system, limit_m = ShuntingSlam(CONFIG), CONFIG.standing.alert_m
     for frame in stream[:-2]:
         assert system.update(frame.without_truth()).converged
-    system._pose_covariance.dragged(np.diag([(limit_m / 3.1) ** 2, 0.0, 0.0]))
+    system._pose_covariance.dragged(np.diag([(limit_m / 2.2) ** 2, 0.0, 0.0]))
     assert system.update(stream[-2].without_truth()).converged
     system._pose_covariance.dragged(np.diag([limit_m**2, 0.0, 0.0]))
     said = system.update(stream[-1].without_truth())
     assert not said.converged
-    of_gaussian = math.exp(-1.0 / (1.0 + 3.1**-2))  # Rayleigh, beyond the limit
+    of_gaussian = math.exp(-1.0 / (1.0 + 2.2**-2))  # Rayleigh, beyond the limit
     assert said.diagnostics["p_lost"] == pytest.approx(of_gaussian, rel=1e-3)
