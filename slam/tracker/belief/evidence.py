@@ -64,9 +64,9 @@ def vanished(
 ) -> float:
     """Share of the long-known surface that a scan confirms and the next sees through, by pose.
 
-    Of what the next confirms or sees through (that by w c): what is hidden from it says nothing. What stands does
-    not vanish from one scan to the next, and what moves has moved little: next to nothing at right
-    poses, and nearly all after a robot was carried elsewhere.
+    Of what the next confirms or sees through (that by w c): what is hidden from it says nothing.
+    What stands does not vanish from one scan to the next, and what moves has moved little: next to
+    nothing at right poses, and nearly all after a robot was carried elsewhere.
     """
     confirmed, passed = Evidence(), Evidence()
     confirmed.add(cell_map, *before)
