@@ -81,7 +81,7 @@ class Look(NamedTuple):
 
 ANEW = np.zeros((2, 0, SIDE, SIDE), np.uint8)  # nothing was counted, and nothing is kept of it
 WHOLE = 255.0  # of a cell that is counted
-LEAST_M = 1e-6  # of a beam that has a direction
+LEAST_M = 1e-6  # m; a shorter beam has no direction: numerical guard
 KNOWN, THROUGH = 0, 1  # kinds of what is counted
 
 

@@ -34,8 +34,8 @@ from slam.tracker.cells import (
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
 
-# w c (``cells.Look``) at which a cell that is seen through counts whole; a surer one counts more.
-# It sets the unit of D. By hand
+# share: w c (``cells.Look``) at which a cell that is seen through counts whole, a surer one more;
+# it sets the unit of D; by hand
 SURE = 0.35
 
 

@@ -44,7 +44,7 @@ class BeliefConfig(Settings):
     )
     vanished: float = number(
         0.1, "share", "of what the scan before confirmed, seen through: costs all of broken",
-        READ_OFF, low=1e-6,
+        low=1e-6,
     )  # fmt: skip
     pulled_m: float = number(0.2, "m", "by which movers pull a match, unlike a slip", low=1e-6)
     pulled_rad: float = number(0.1, "rad", "the same of its turn", low=1e-6)
