@@ -29,6 +29,7 @@ from slam.tracker.cells import (
     Look,
     fresh,
     in_reach,
+    stamped,
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
 from slam.tracker.network import Network
@@ -98,6 +99,7 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
             cells.y[slot] = 0.0
             cells.age[slot] = 0.0
             cells.facing[slot] = 0
+            cells.off[slot] = 0
             cells.scratch_of[slot] = -1
     return True
 
@@ -105,7 +107,8 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
 @njit
 def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     cells: Cells, log_odds: NDArray[np.float32], view: View, T_map_laser: NDArray[np.float64],
-    cell: float, step: float, odds: Odds, known_s: float, write: bool, counted: NDArray[np.uint8],
+    cell: float, step: float, odds: Odds, known_s: float, off: int, write: bool,
+    counted: NDArray[np.uint8],
 ) -> Look:  # fmt: skip
     """Add one scan, ``step`` s after the last, to ``log_odds`` (S, 8, 8) by slot.
 
@@ -148,6 +151,9 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
                     else:
                         confirmed += y * given
                         known += fresh(counted, once, KNOWN, slot, jj, ii, weight * given)
+                        if write:
+                            before = cells.off[slot, jj, ii]
+                            cells.off[slot, jj, ii] = stamped(before, weight, SURE, off)
                         if given < odds.struck:
                             continue
                         more = odds.hit
@@ -243,7 +249,7 @@ class Grid(CellMap):
                 self.grow()
         result = integrate(
             self.cells, self.log_odds, view, T_map_laser, self.cell, step, self._odds,
-            self.config.map.known_s, write, counted,
+            self.config.map.known_s, self.off_cm, write, counted,
         )  # fmt: skip
         if write:
             self.release()

@@ -20,6 +20,7 @@ from slam.frontend.visibility import View
 from slam.tracker.cells import (
     ANEW,
     FIRST,
+    MOST_OFF,
     SIDE,
     Cells,
     Look,
@@ -47,7 +48,11 @@ class CellMap(abc.ABC):
     """Holds the arrays and keeps them large enough.
 
     A SLAM's own map says in ``integrate`` how a scan is taken in.
+
+    off_cm  cm, ``Cells.off`` of what becomes long known now
     """
+
+    off_cm = MOST_OFF
 
     def __init__(self, config: TrackerConfig) -> None:
         self.config = config

@@ -18,6 +18,7 @@ from slam.frontend.visibility import View
 SIDE = 8  # cells along a block's edge
 SHIFT, MASK = 3, 7  # i >> SHIFT is the block of cell i, i & MASK its place inside
 
+MOST_OFF = 255  # cm
 FREE_COUNT, TOUCHED_COUNT = 0, 1  # places in ``Cells.counts``
 FIRST, _FIRST_ACROSS = 64, 64  # blocks that there is room for, and their directory's edge
 
@@ -31,6 +32,8 @@ class Cells(NamedTuple):
     y           (S, 8, 8) float32: long-term trace, the running mean of the input
     age         (S, 8, 8) float32: s of looking that ``y`` averages over
     facing      (S, 8, 8) uint8: the way the surface faces that was traced there (``surfaces.face``)
+    off         (S, 8, 8) uint8: cm, deviation by which the map was off when the surface became long
+                known, ``MOST_OFF`` for more or unknown; 0 in a map of a file
     free        (S,) int32: stack of unused slots
     scratch_of  (S,) int32: row of ``impression`` of a slot the present scan touches, else -1
     impression  (T, 8, 8) float32: I of the present scan
@@ -45,6 +48,7 @@ class Cells(NamedTuple):
     y: NDArray[np.float32]
     age: NDArray[np.float32]
     facing: NDArray[np.uint8]
+    off: NDArray[np.uint8]
     free: NDArray[np.int32]
     scratch_of: NDArray[np.int32]
     impression: NDArray[np.float32]
@@ -57,7 +61,7 @@ class Cells(NamedTuple):
 def named(arrays: tuple[Any, ...]) -> Cells:
     """The arrays of ``Cells``, which take a microsecond more than a plain tuple to a kernel."""
     a = arrays
-    return Cells(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11])
+    return Cells(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12])
 
 
 class Look(NamedTuple):
@@ -120,6 +124,15 @@ def fresh(  # noqa: PLR0913 (kernel)
     return weight if kind == KNOWN else weight**3 - before**3
 
 
+@inner
+def stamped(before: int, weight: float, sure: float, now: int) -> int:
+    """``Cells.off`` of a cell that a scan confirms: that of when its weight became ``sure``.
+
+    Or less, where it is seen again while the map is off by less.
+    """
+    return min(before, now) if weight >= sure else now
+
+
 def no_cells(slots: int = FIRST, scratch: int = FIRST) -> Cells:
     """A plane on which nothing lives yet, with room for so many blocks and impressions."""
     shape, rows = (slots, SIDE, SIDE), (scratch, SIDE, SIDE)
@@ -130,6 +143,7 @@ def no_cells(slots: int = FIRST, scratch: int = FIRST) -> Cells:
         y=np.zeros(shape, np.float32),
         age=np.zeros(shape, np.float32),
         facing=np.zeros(shape, np.uint8),
+        off=np.zeros(shape, np.uint8),
         free=np.arange(slots, dtype=np.int32)[::-1].copy(),
         scratch_of=np.full(slots, -1, np.int32),
         impression=np.zeros(rows, np.float32),
@@ -160,6 +174,7 @@ def with_room(old: Cells) -> Cells:
             y=_longer(old.y, more, 0),
             age=_longer(old.age, more, 0),
             facing=_longer(old.facing, more, 0),
+            off=_longer(old.off, more, 0),
             free=free,
             scratch_of=_longer(old.scratch_of, more, -1),
         )

@@ -31,6 +31,7 @@ from slam.tracker.cells import (
     in_reach,
     named,
     released,
+    stamped,
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
 
@@ -52,6 +53,7 @@ class Law(NamedTuple):
     trace       whether a long-term trace is kept
     faded       a trace below ends where the input is below ``unseen``
     known_s     s of looking after which half of a trace counts as long known
+    off         cm, ``Cells.off`` of what becomes long known now
     """
 
     step: float
@@ -65,6 +67,7 @@ class Law(NamedTuple):
     faded: float
     unseen: float
     known_s: float
+    off: int
 
 
 @inner
@@ -103,7 +106,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
     """
     cells, v, n = named(arrays), plain_view, numbers
     view = View(v[0], v[1], v[2], v[3], v[4], v[5])
-    law = Law(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10])
+    law = Law(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11])
     confirmed, contradicted, visited = 0.0, 0.0, 0
     known, through = 0.0, 0.0
     once = counted.shape[1] > 0
@@ -154,6 +157,9 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                             y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
                         )
                         known += fresh(counted, once, KNOWN, slot, jj, ii, weight * given)
+                        if write:
+                            before = cells.off[slot, jj, ii]
+                            cells.off[slot, jj, ii] = stamped(before, weight, SURE, law.off)
                     visited += 1
                     if not write:
                         continue
@@ -221,6 +227,7 @@ class Network(CellMap):
             numbers.faded,
             numbers.unseen,
             numbers.known_s,
+            self.off_cm,
         )
         arrays = tuple(self.cells)
         return integrate(arrays, tuple(view), T_map_laser, self.cell, law, write, counted)

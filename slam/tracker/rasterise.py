@@ -51,7 +51,7 @@ def _touch(cells: Cells, column: int, row: int) -> int:
         for j in range(SIDE):
             for i in range(SIDE):
                 cells.x[slot, j, i] = cells.y[slot, j, i] = cells.age[slot, j, i] = 0.0
-                cells.facing[slot, j, i] = 0
+                cells.facing[slot, j, i] = cells.off[slot, j, i] = 0
     cells.counts[TOUCHED_COUNT] += 1
     cells.touched[scratch, 0] = slot
     cells.touched[scratch, 1] = column + cells.corner[0]

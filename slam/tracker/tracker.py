@@ -2,6 +2,7 @@
 """A SLAM on a map of cells, whatever the map: scan matching, uncertainty, relocalisation, loops."""
 
 import abc
+import math
 from collections.abc import Callable, Mapping
 from functools import partial
 from pathlib import Path
@@ -22,6 +23,7 @@ from slam.tracker.belief.belief import Belief, Judged
 from slam.tracker.belief.places import coarse
 from slam.tracker.belief.status import State, Status
 from slam.tracker.cell_map import CellMap
+from slam.tracker.cells import MOST_OFF
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
@@ -198,6 +200,7 @@ class Tracker(abc.ABC):
             evidence = look(self.cell_map, short_term, observations, T_map_robot, times, turn)
             self._standing.agreement.hold(evidence.old, elapsed)
         if judged.writes:
+            self.cell_map.off_cm = min(math.ceil(100.0 * self._pose_covariance.off_m), MOST_OFF)
             rasterise(self.cell_map, observations, T_map_robot)
             T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
             seen = self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
@@ -217,6 +220,8 @@ class Tracker(abc.ABC):
             dragged = agreement.dragged()
             lasting, now = agreement.left_behind(), agreement.covariance()
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
+        if evidence is not None and not match.slipped:
+            self._pose_covariance.held(agreement.shown, evidence.old_off_m2, prediction.elapsed)
         self._pose_covariance.dragged(lasting, now)
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
             self._odometry_noise.note_slip(prediction, match)

@@ -8,6 +8,7 @@ the long-known map and what they see through (``evidence``), and a prior that is
 posterior. docs/belief.md has the mathematics.
 """
 
+import math
 from collections.abc import Callable
 from dataclasses import dataclass, replace
 
@@ -32,6 +33,7 @@ from slam.tracker.standing.agreement import Agreement
 
 DENIED = 14.2  # squared, in variances, of three numbers: odometry allows less in 997 of 1000
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
+SIGMAS, WIDEST_M = 2.0, 1.5  # of what odometry may be off, how far is searched; set by hand
 LEFT_S = 3.0  # for so long nothing of the map is in view: no crowd in passing; set by hand
 
 
@@ -117,8 +119,9 @@ class Belief:
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
         if self._odds.asked and self._is_dragged(cell_map, observations, match):
+            odd = odd or self._agreement.dragged() > 0.5
             pose = self._agreement.undragged(match.T_map_robot)
-            match, odd = unmatched(pose, matched=match.matched, score=0.0), True
+            match = unmatched(pose, matched=match.matched, score=0.0)
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
         gone, now = 0.0, (self._latest, match.T_map_robot)
@@ -134,10 +137,13 @@ class Belief:
         return self._decided(episode, cell_map, observations, match, prediction)
 
     def _is_dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> bool:
-        """Whether movers rather carried the match than odometry errs: by it, and what is known."""
-        dragged = self._agreement.dragged()
-        if dragged <= 0.5:
+        """Whether movers rather carried the match than odometry errs: by it, and what is known.
+
+        Where old surface held the match and odometry denies it, the map alone decides.
+        """
+        if not self._agreement.suspected:
             return False
+        dragged = max(self._agreement.dragged(), 0.5)
         poses = match.T_map_robot, self._agreement.put_back(match.T_map_robot)
         looks = [Evidence().add(cell_map, observations, pose) for pose in poses]
         here, back = probabilities([self._odds.evidence(look) for look in looks])
@@ -223,8 +229,10 @@ class Belief:
         points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
         few = replace(everyone, points_robot=points, weights=weights)
         slip = self._agreement.shown(spread(self._config.slip_m, self._config.slip_rad))
-        loose = inverted(slip + prediction.step)  # not what adds up where nothing shows it
-        window = SearchWindow(reach_m=numbers.near_m, turn_rad=numbers.near_rad)
+        # not what adds up where nothing shows it, but odometry's drift since the doubt began
+        loose = inverted(slip + prediction.step + episode.drift)
+        reach_m = min(SIGMAS * math.sqrt(max(episode.drift[0, 0], episode.drift[1, 1])), WIDEST_M)
+        window = SearchWindow(reach_m=max(reach_m, numbers.near_m), turn_rad=numbers.near_rad)
         start = prediction.T_map_robot
         found = self._matcher.search(cell_map, few, start, loose, window)
         found = self._matcher.climb(cell_map, everyone, found.T_map_robot, start, loose)
@@ -380,7 +388,7 @@ class Belief:
         self._agreement.forget()
         slipped = place.prior > episode.carried_there
         if slipped:
-            wide = spread(self._config.slip_m, self._config.slip_rad)
+            wide = spread(self._config.slip_m, self._config.slip_rad) + episode.drift
             return Judged(
                 match=replace(place.match, slipped=True),
                 prediction=replace(prediction, covariance=wide),

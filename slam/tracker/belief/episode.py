@@ -15,9 +15,9 @@ import numpy as np
 from slam import se2
 from slam.frames import Float
 from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import Prediction
+from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.belief.evidence import Evidence
-from slam.tracker.belief.places import Place, Places
+from slam.tracker.belief.places import Place, Places, coarse
 from slam.tracker.belief.posterior import MOST_NATS, Odds, probabilities
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import used
@@ -49,6 +49,7 @@ class Episode:
     broken    nats against the motion of any scan so far, at most; of them break_nats are those of
               returns that do not go on
     matched   whether the latest scan was matched to the copy
+    drift     (3, 3) in the map: by how much odometry may be off, since it began
     """
 
     def __init__(self, cell_map: CellMap, matcher: Matcher, odds: Odds, elapsed: float) -> None:
@@ -59,6 +60,8 @@ class Episode:
         self.before = Evidence()
         self.broken = self.break_nats = 0.0
         self.way_m = self.elapsed_s = 0.0
+        self.drift: Float = np.zeros((3, 3))
+        self._found = coarse(matcher.config.tracking.relocalise)
         self._carried = odds.carried(elapsed)
         self.match = unmatched(np.zeros(3), matched=0.0, score=0.0)
         self.matched = False
@@ -87,13 +90,19 @@ class Episode:
     def moved(self, prediction: Prediction) -> None:
         """The robot has moved on."""
         self.elapsed_s += prediction.elapsed
-        x, y, _ = prediction.increment.tolist()
+        x, y, turn = prediction.increment.tolist()
         self.way_m = math.hypot(x, y)
+        before = prediction.T_map_robot - (0.0, 0.0, turn)
+        step = turned(prediction.covariance, -float(before[2]))
+        self.drift = se2.propagate(self.drift, before, prediction.increment, step)
 
     def prior(self, place: Match, here: Float) -> float:
-        """Nats of a slip from ``here`` to that place."""
-        x, y, turn = (place.T_map_robot - here).tolist()
-        return self._odds.slipped(self.way_m, math.hypot(x, y), se2.wrap(turn))
+        """Nats of a slip from ``here`` to that place, or of odometry's drift: what is likelier."""
+        off = place.T_map_robot - here
+        off[2] = se2.wrap(float(off[2]))
+        x, y, turn = off.tolist()
+        slipped = self._odds.slipped(self.way_m, math.hypot(x, y), turn)
+        return max(slipped, self._odds.drifted(off, self.drift, self._found))
 
     def weight(self, place: Place) -> float:
         """Nats of having been carried to a place, or of having slipped there."""

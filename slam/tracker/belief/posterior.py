@@ -85,6 +85,21 @@ class Odds:
         rate = math.log(config.slips_per_m * max(way_m, LEAST_M))
         return rate - 0.5 * ((off_m / config.slip_m) ** 2 + (off_rad / config.slip_rad) ** 2)
 
+    @staticmethod
+    def drifted(off: Float, drift: Float, found: Float) -> float:
+        """Log prior of being ``off`` (3,) by what odometry may have drifted, (3, 3).
+
+        The place is the best of all that a search tells apart by ``found`` (3, 3).
+        """
+        best_of = _determinant(drift + found) / _determinant(found)
+        return -0.5 * (squared(off, drift) + math.log(best_of))
+
+
+def _determinant(covariance: Float) -> float:
+    """Of a (3, 3) covariance, in a fixed order of operations."""
+    (a, b, c), (_, d, e), (_, _, f) = covariance.tolist()
+    return float(a * (d * f - e * e) - b * (b * f - c * e) + c * (b * e - c * d))
+
 
 def sum_of(nats: Sequence[float]) -> float:
     """Log of the sum of weights."""

@@ -50,7 +50,8 @@ class Agreement:
     not, the matches followed movers, and little old surface among them held nothing: the pose is
     put back by F, the sum of c.
 
-    ratio  that
+    ratio   that
+    denied  the same of F: what old surface held may be a board that stood for long, and now moves
     """
 
     def __init__(self, config: StandingConfig, pull: Pull = Pull()) -> None:  # noqa: B008 (frozen)
@@ -63,7 +64,7 @@ class Agreement:
         """The robot was set elsewhere: what was summed says nothing of it."""
         self._sum, self._whole, self._variance = [0.0] * 3, [0.0] * 3, [0.0] * 6
         self._held, self._looks = [0.0] * 6, 0.0
-        self.ratio = 0.0
+        self.ratio = self.denied = 0.0
         self._elapsed_s = 0.0
         self._put_back: Float = np.zeros((3, 3))
 
@@ -125,13 +126,19 @@ class Agreement:
         more = (xx, xy, xt, yy, yt, tt)
         V = [keep * keep * a + b for a, b in zip(self._variance, more, strict=True)]
         self._variance = V
-        self.ratio = self._form(S, V) / 3.0
+        self.ratio, self.denied = (self._form(sums, V) / 3.0 for sums in (S, self._whole))
 
     def _form(self, S: list[float], V: list[float]) -> float:
         """S' (V + R)^-1 S in a fixed order of operations; V by xx, xy, xt, yy, yt, tt."""
         (x, y, t), (xx, xy, xt, yy, yt, tt), (own_x, own_y, own_t) = S, V, self._own
         a, b, c, d, e, f = upper_inverted(xx + own_x, xy, xt, yy + own_y, yt, tt + own_t)
         return x * (a * x + 2.0 * (b * y + c * t)) + y * (d * y + 2.0 * e * t) + f * t * t
+
+    @property
+    def suspected(self) -> bool:
+        """Whether odometry denies the corrections of the window. One alone is no sum."""
+        often = self._elapsed_s <= self._config.window_s
+        return self.dragged() > 0.5 or (often and 0.0 < self._config.disagreed < self.denied)
 
     def dragged(self) -> float:
         """Probability in [0, 1) that the matches are wrong, and not odometry."""

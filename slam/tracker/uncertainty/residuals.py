@@ -102,12 +102,13 @@ def _age(cells: Cells, u: float, v: float) -> float:
 
 
 @inner
-def _old(cells: Cells, u: float, v: float) -> float:
+def _old(cells: Cells, u: float, v: float) -> tuple[float, float]:
     """Share in [0, 1] in which the surface next to (u, v) is an old one: its trace y, by its age.
 
-    Of the cells within one of the nearest, the most: a point lies off the surface by its noise.
+    Of the cells within one of the nearest, the most: a point lies off the surface by its noise. And
+    by how much, m, the map was off when that cell became long known.
     """
-    most = 0.0
+    most, off = 0.0, 0.0
     rows, columns = cells.directory.shape
     for j in range(math.floor(v - 0.5), math.floor(v - 0.5) + 3):
         for i in range(math.floor(u - 0.5), math.floor(u - 0.5) + 3):
@@ -118,8 +119,10 @@ def _old(cells: Cells, u: float, v: float) -> float:
             if slot >= 0:
                 age = float(cells.age[slot, j & MASK, i & MASK]) / OLD_S
                 share = age * age / (age * age + 1.0)
-                most = max(most, float(cells.y[slot, j & MASK, i & MASK]) * share)
-    return most
+                share *= float(cells.y[slot, j & MASK, i & MASK])
+                if share > most:
+                    most, off = share, 0.01 * cells.off[slot, j & MASK, i & MASK]
+    return most, off
 
 
 @inner
@@ -203,7 +206,7 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         sums[NEW] += w * times[0] / age
         new = (times[0] + times[2]) / (age + times[2])
         rx, ry = (u + 0.5) * cell - pose[0], (v + 0.5) * cell - pose[1]
-        a, b, d, o = 1.0, 0.0, 1.0, _old(cells, u, v)
+        a, b, d, (o, old_off) = 1.0, 0.0, 1.0, _old(cells, u, v)
         if k >= 0:
             dx, dy = points[k, 0] - points[first, 0], points[k, 1] - points[first, 1]
             length = math.sqrt(dx * dx + dy * dy)
@@ -228,6 +231,8 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         geometry[0, 2] += e
         geometry[1, 2] += f
         geometry[2, 2] += h
+        old[6] += o * w
+        old[7] += o * w * old_off * old_off
         old[0] += o * a
         old[1] += o * b
         old[2] += o * e
@@ -257,6 +262,7 @@ class Evidence:
               have in its trace since all directions were last seen
     old       (6,) xx, xy, xt, yy, yt, tt: the geometry, each point times the share in which its
               surface is an old one; of all points in view
+    old_off_m2  m^2, mean over old surface of what the map was off when it became known, squared
     """
 
     geometry: Float
@@ -268,6 +274,7 @@ class Evidence:
     new: float
     new_geometry: Float
     old: Float
+    old_off_m2: float
 
 
 def look(
@@ -292,7 +299,7 @@ def look(
         config.bent,
         seen.sensor_sigma_m,
     )
-    geometry, sums, old = np.zeros((3, 3)), np.zeros(8), np.zeros(6)
+    geometry, sums, old = np.zeros((3, 3)), np.zeros(8), np.zeros(8)
     elapsed, since_s = times
     _look(
         tuple(cell_map.cells), short_term, cell, seen.points_robot, seen.covariances, seen.weights,
@@ -310,5 +317,6 @@ def look(
         feigned=feigned,
         new=new,
         new_geometry=sums[NEW_XX:],
-        old=old,
+        old=old[:6],
+        old_off_m2=float(old[7] / old[6]) if old[6] > 0.0 else 0.0,
     )

@@ -184,3 +184,24 @@ def test_a_wall_seen_through_along_it_counts_little(kind: Kind) -> None:
         assert share < 0.1
     else:  # the grid does not know which way its surfaces face
         assert share == pytest.approx(1.0)
+
+
+def test_a_surface_keeps_what_the_map_was_off_when_it_became_known(kind: type[CellMap]) -> None:
+    """Or less, where it is seen again by a robot that is surer; what is new is off as the map."""
+    world, here = World2D(arena()), np.zeros(3)
+    cell_map, scan = known(kind, world, 0.5, here), seen(world, here, kind)
+    at = se2.compose(here, scan.T_robot_laser)
+
+    def looked(off_cm: int, times: int) -> set[int]:
+        cell_map.off_cm = off_cm
+        for _ in range(times):
+            rasterise(cell_map, scan, here)
+            cell_map.integrate(scan.view, at, 0.5, write=True)
+        cells = cell_map.cells
+        sure = cells.y * cells.age / (cells.age + 5.0)
+        return set(cells.off[sure > 0.95 * sure.max()].tolist())
+
+    assert looked(7, 60) == {7}
+    assert looked(90, 10) == {7}
+    assert looked(3, 1) == {3}
+    assert looked(90, 10) == {3}

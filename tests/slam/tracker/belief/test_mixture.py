@@ -7,7 +7,8 @@ from dataclasses import replace
 import numpy as np
 import pytest
 
-from slam.frontend.odometry_prior import Prediction
+from slam import se2
+from slam.frontend.odometry_prior import Prediction, squared, turned
 from slam.tracker.belief.episode import Episode, second_moment
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places
@@ -83,6 +84,39 @@ def test_a_place_a_hand_away_speaks_for_the_motion_against_places_elsewhere() ->
     np.testing.assert_allclose(said[0], said[1])
     episode.places.followed = [elsewhere]
     assert episode.weighed().places[0] > 100.0 * episode.weighed().followed
+
+
+def test_a_place_as_far_off_as_odometry_may_be_is_no_slip() -> None:
+    """A robot that saw nothing of its map for a while need not have been carried to be far off."""
+    odds = Odds(CONFIG.belief, CONFIG.carried_per_h)
+    episode = Episode(known(NETWORK, ROOM, 1.0, ORIGIN), Matcher(CONFIG), odds, 0.1)
+    rng, step, sigma = np.random.default_rng(5), np.array([0.1, 0.0, 0.06]), np.array([0.03] * 3)
+    drawn, pose = np.zeros((2000, 3)), np.array([1.0, 2.0, 3.0])
+    drawn += pose
+    for _ in range(40):
+        heading = float(pose[2])
+        pose = se2.compose(pose, step)
+        episode.moved(
+            Prediction(
+                T_map_robot=pose,
+                increment=step,
+                twist=np.zeros(3),
+                elapsed=0.1,
+                covariance=turned(np.diag(sigma**2), heading),
+            )
+        )
+        steps = step + sigma * rng.normal(size=(2000, 3))
+        drawn = np.array([se2.compose(a, b) for a, b in zip(drawn, steps, strict=True)])
+    off = drawn - pose
+    off[:, 2] = (off[:, 2] + math.pi) % math.tau - math.pi
+    np.testing.assert_allclose(episode.drift, off.T @ off / len(off), rtol=0.15, atol=0.01)
+    far = off[np.hypot(off[:, 0], off[:, 1]) > 0.7]
+    assert len(far) > 60  # of 2000
+    usual = min(far, key=lambda one: squared(one, episode.drift))
+    there = unmatched(pose + usual, matched=1.0, score=0.0)
+    assert episode.prior(there, pose) > episode.carried_there + 5.0
+    slip = odds.slipped(0.1, math.hypot(*usual[:2]), float(usual[2]))
+    assert slip < episode.carried_there
 
 
 def test_a_place_is_carried_on_by_odometry_and_matched_to_the_scan() -> None:

@@ -141,6 +141,20 @@ def test_the_prior_of_a_slip_is_a_rate_a_metre_times_a_gaussian() -> None:
     assert ODDS.slipped(0.0, 0.1, 0.0) == ODDS.slipped(LEAST_M, 0.1, 0.0)  # who stands is pushed
 
 
+@pytest.mark.parametrize("seed", range(5))
+def test_the_prior_of_a_drift_is_its_gaussian_and_what_the_best_of_many_places_costs(
+    seed: int,
+) -> None:
+    """As likely, at its middle, as a place that is found has a share in what odometry allows."""
+    rng = np.random.default_rng(seed)
+    root = rng.normal(0.0, 0.4, (3, 3))
+    drift, found = root @ root.T + 1e-4 * np.eye(3), np.diag([0.01, 0.01, 7e-4])
+    off = rng.normal(0.0, 0.4, 3)
+    shares = np.linalg.det(found) / np.linalg.det(drift + found)
+    expected = -0.5 * off @ np.linalg.solve(drift, off) + 0.5 * math.log(shares)
+    assert Odds.drifted(off, drift, found) == pytest.approx(expected)
+
+
 def test_the_prior_of_being_carried_is_a_rate_an_hour() -> None:
     assert math.exp(Odds(CONFIG, 3.0).carried(0.2)) == pytest.approx(3.0 * 0.2 / S_PER_H)
     assert Odds(CONFIG, 3.0).carried(0.0) == Odds(CONFIG, 3.0).carried(LEAST_S)

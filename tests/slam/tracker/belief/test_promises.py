@@ -9,6 +9,9 @@ from typing import Any
 import numpy as np
 import pytest
 
+from scripts.integrity import plane
+from scripts.integrity.plane import StreamSpec
+from slam import se2
 from slam.frontend.observations import observe
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.episode import Episode
@@ -375,3 +378,16 @@ def test_old_surface_holds_the_robot_and_holds_no_more_once_a_box_hides_it(
     hidden = World2D(np.concatenate([box, arena()]))
     told(system, going_on(still(hidden, pose, 2.5), seen[-1]))
     assert max(held._held[0], held._held[3]) / held._looks < 0.5 * walls
+
+
+def test_boards_that_stood_for_long_do_not_carry_the_robot_along_when_they_move() -> None:
+    """They are old surface by then. Odometry denies what they do, and the map prefers odometry."""
+    worst_m = 0.0
+    stream = plane.frames(StreamSpec(kind="moved30_calm", seed=140005, seconds=62.0))
+    system = ShuntingSlam()
+    for frame in stream:
+        start, estimate = stream[0].truth, system.update(frame.without_truth())
+        assert start is not None
+        assert frame.truth is not None
+        worst_m = max(worst_m, off_m(estimate, se2.between(start, frame.truth)))
+    assert worst_m < 0.5

@@ -2,6 +2,7 @@
 """Corrections that odometry denies over seconds, though none of them alone is too large."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -53,6 +54,25 @@ def test_small_corrections_to_one_side_add_up() -> None:
     V = SIGMA[0] ** 2 * (1.0 - keep ** (2 * n)) / (1.0 - keep**2)
     assert agreement.ratio == pytest.approx(S * S / (V + NUMBERS.match_m**2) / 3.0, rel=1e-9)
     assert agreement.by_movers == pytest.approx([S, 0.0, 0.0], rel=1e-9)
+
+
+def test_odometry_denies_corrections_that_old_surface_held_too() -> None:
+    """A board that stood for long is old surface, and moves one day: the map is asked."""
+    rows, n = np.tile([4.0 * SIGMA[0], 0.0, 0.0], (10, 1)), 10
+    held, keep = fed(rows, A_ROOM, vote=1.0), math.exp(-STEP_S / NUMBERS.window_s)
+    F = 4.0 * SIGMA[0] * (1.0 - keep**n) / (1.0 - keep)
+    V = SIGMA[0] ** 2 * (1.0 - keep ** (2 * n)) / (1.0 - keep**2)
+    assert held.denied == pytest.approx(F * F / (V + NUMBERS.match_m**2) / 3.0, rel=1e-9)
+    assert held.suspected
+    assert held.dragged() < 0.02  # but nobody is in view who moves
+    rng = np.random.default_rng(5)
+    usual = [fed(rng.normal(0.0, SIGMA, (100, 3)), A_ROOM).suspected for _ in range(40)]
+    assert sum(usual) <= 4
+    assert not fed(rows, A_ROOM, vote=1.0, config=ALL_VOTE).suspected
+    seldom = replace(by_odometry(), elapsed=1.01 * NUMBERS.window_s)
+    held.take(seldom, 40.0 * SIGMA, 1.0)
+    assert held.denied > NUMBERS.disagreed
+    assert not held.suspected  # one correction is no sum
 
 
 def test_what_old_surface_shows_is_odometrys_error() -> None:

@@ -17,6 +17,7 @@ from slam.system import Estimate
 from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
+from slam.tracker.standing.agreement import Agreement
 from slam.tracker.uncertainty.covariances import observable
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise, innovation
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
@@ -46,7 +47,7 @@ def matched(information: Float, T: Float = ZERO) -> Match:
 def seen(geometry: Float, weighed: float = 20.0, **more: Any) -> Evidence:
     """Surfaces of that geometry a beam, seen long and with errors of their own."""
     rest: dict[str, Any] = {"in_view": 75.0, "shared": 0.0, "feigned": 0.0, "new": 0.0} | more
-    rest = {"paired": weighed, "new_geometry": ZERO, "old": np.zeros(6)} | rest
+    rest = {"paired": weighed, "new_geometry": ZERO, "old": np.zeros(6), "old_off_m2": 0.0} | rest
     return Evidence(geometry=weighed * geometry, weighed=weighed, **rest)
 
 
@@ -438,14 +439,57 @@ def test_what_movers_carried_off_adds_up_until_a_loop_or_another_place_says_bett
 
 
 def test_a_pose_that_movers_may_have_carried_beyond_the_alert_limit_is_not_believed() -> None:
+    """Its variance lies along one direction: beyond the limit on either side."""
     stream = frames(World2D(arena()), Drive((0.0, 0.0, 0.0), ((0.0, 0.0, 1.0),)), rate_hz=5.0)
     system, limit_m = ShuntingSlam(CONFIG), CONFIG.standing.alert_m
     for frame in stream[:-2]:
         assert system.update(frame.without_truth()).converged
-    system._pose_covariance.dragged(np.diag([(limit_m / 2.2) ** 2, 0.0, 0.0]))
+    system._pose_covariance.dragged(np.diag([(limit_m / 2.6) ** 2, 0.0, 0.0]))
     assert system.update(stream[-2].without_truth()).converged
     system._pose_covariance.dragged(np.diag([limit_m**2, 0.0, 0.0]))
     said = system.update(stream[-1].without_truth())
     assert not said.converged
-    of_gaussian = math.exp(-1.0 / (1.0 + 2.2**-2))  # Rayleigh, beyond the limit
-    assert said.diagnostics["p_lost"] == pytest.approx(of_gaussian, rel=1e-3)
+    drawn = np.random.default_rng(7).normal(0.0, limit_m * math.sqrt(1.0 + 2.6**-2), 200_000)
+    assert said.diagnostics["p_lost"] == pytest.approx(np.mean(abs(drawn) > limit_m), abs=0.005)
+
+
+def test_old_surface_holds_to_what_it_was_off_itself_and_says_nothing_along_a_corridor() -> None:
+    """What it says nothing of stays, and it is trusted no further than to twice its variance."""
+    agreement = Agreement(CONFIG.standing)
+    agreement.hold(np.array([20.0, 0.0, 0.0, 0.0, 0.0, 40.0]), 0.2)  # walls across x, none across y
+    wide = np.diag([0.09, 0.04, 0.01])
+    for off_m in (0.0, 0.1, 0.3):
+        pose = PoseCovariance(CONFIG)
+        pose.dragged(wide)
+        pose.held(agreement.shown, 4.0, 1.0)  # off by more than the map is now
+        assert pose.off_m == pytest.approx(math.sqrt(0.13))
+        sizes = []
+        for _ in range(2000):
+            pose.held(agreement.shown, off_m**2, 0.2)
+            pose.dragged(np.zeros((3, 3)))
+            sizes.append(pose.off_m)
+        assert np.all(np.diff(sizes) <= 0.0)
+        assert np.linalg.eigvalsh(pose.covariance).min() > -1e-12
+        along_m2, twice_m2 = 0.04, 2.0 * off_m**2
+        expected_m = math.sqrt(max(along_m2, min(twice_m2, 0.13)))
+        assert sizes[-1] == pytest.approx(expected_m, abs=0.02)
+        assert pose.by_movers_m == pytest.approx(sizes[-1])
+
+
+@pytest.mark.parametrize(("off_m", "trusted"), [(0.0, True), (0.4, False)])
+def test_trust_comes_back_among_surfaces_that_were_known_before_and_no_others(
+    off_m: float, trusted: bool
+) -> None:
+    """A room that was mapped while the map was off by as much says nothing of it."""
+    room, turn = World2D(arena()), Drive((0.0, 0.0, 0.0), ((0.0, 0.8, 30.0),))
+    stream = frames(room, turn, rate_hz=5.0, seed=3)
+    system = ShuntingSlam(CONFIG)
+    before = len(stream) // 2
+    for k, frame in enumerate(stream):
+        if (k == 1 and off_m > 0.0) or k == before:
+            carried = off_m if k == 1 else 0.4
+            system._pose_covariance.dragged(np.diag([0.5 * carried**2, 0.5 * carried**2, 1e-4]))
+        estimate = system.update(frame.without_truth())
+        if k == before:
+            assert not estimate.converged
+    assert estimate.converged == trusted
