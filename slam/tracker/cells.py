@@ -33,7 +33,7 @@ class Cells(NamedTuple):
     age         (S, 8, 8) float32: s of looking that ``y`` averages over
     facing      (S, 8, 8) uint8: the way the surface faces that was traced there (``surfaces.face``)
     off         (S, 8, 8) uint8: cm, deviation by which the map was off when the surface became long
-                known, ``MOST_OFF`` for more or unknown; 0 in a map of a file
+                known; ``MOST_OFF``: more, or unknown, as in a map of a file
     free        (S,) int32: stack of unused slots
     scratch_of  (S,) int32: row of ``impression`` of a slot the present scan touches, else -1
     impression  (T, 8, 8) float32: I of the present scan

@@ -29,7 +29,7 @@ from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing
 from slam.frames import Float
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import FREE_COUNT, SIDE, living
+from slam.tracker.cells import FREE_COUNT, MOST_OFF, SIDE, living
 from slam.tracker.config import TrackerConfig
 
 # Numbers that trackers no longer have, of maps that were saved while they had them.
@@ -313,4 +313,5 @@ def fill(cell_map: CellMap, arrays: dict[str, NDArray[Any]]) -> None:
         cells.directory[row, column] = slot
         cells.x[slot], cells.y[slot] = arrays["x"][k], arrays["y"][k]
         cells.facing[slot] = arrays["facing"][k]
+        cells.off[slot] = MOST_OFF
         cell_map.restore(slot, arrays["age"][k])

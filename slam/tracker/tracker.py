@@ -200,7 +200,7 @@ class Tracker(abc.ABC):
             evidence = look(self.cell_map, short_term, observations, T_map_robot, times, turn)
             self._standing.agreement.hold(evidence.old, elapsed)
         if judged.writes:
-            self.cell_map.off_cm = min(math.ceil(100.0 * self._pose_covariance.off_m), MOST_OFF)
+            self.cell_map.off_cm = math.ceil(min(100.0 * self._pose_covariance.off_m, MOST_OFF))
             rasterise(self.cell_map, observations, T_map_robot)
             T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
             seen = self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
@@ -220,14 +220,15 @@ class Tracker(abc.ABC):
             dragged = agreement.dragged()
             lasting, now = agreement.left_behind(), agreement.covariance()
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
-        if evidence is not None and not match.slipped:
+        matched = match.tau > 0.0 and not match.slipped
+        if evidence is not None and matched:
             self._pose_covariance.held(agreement.shown, evidence.old_off_m2, prediction.elapsed)
         self._pose_covariance.dragged(lasting, now)
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
             self._odometry_noise.note_slip(prediction, match)
         else:
             self._odometry_noise.forget_slip()
-        if judged.state is State.TRACKING and not match.slipped:
+        if judged.state is State.TRACKING and matched:
             sigma_m, along_rad = observations.sensor_sigma_m, self._pose_covariance.along_rad
             self._odometry_noise.learn(prediction, match, sigma_m, along_rad)
         else:

@@ -33,6 +33,7 @@ from slam.tracker.standing.agreement import Agreement
 
 DENIED = 14.2  # squared, in variances, of three numbers: odometry allows less in 997 of 1000
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
+LEAST_P = 1e-300  # numerical guard
 SIGMAS, WIDEST_M = 2.0, 1.5  # of what odometry may be off, how far is searched; set by hand
 LEFT_S = 3.0  # for so long nothing of the map is in view: no crowd in passing; set by hand
 
@@ -118,9 +119,10 @@ class Belief:
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
-        if self._odds.asked and self._is_dragged(cell_map, observations, match):
+        dragged = self._dragged(cell_map, observations, match) if self._odds.asked else 0.0
+        if dragged > 0.5:
             odd = odd or self._agreement.dragged() > 0.5
-            pose = self._agreement.undragged(match.T_map_robot)
+            pose = self._agreement.undragged(match.T_map_robot, dragged)
             match = unmatched(pose, matched=match.matched, score=0.0)
         if not self._odds.asked or not odd:
             return self._settled(cell_map, match, prediction)
@@ -136,18 +138,17 @@ class Belief:
         episode.write(observations, match.T_map_robot, prediction.elapsed)
         return self._decided(episode, cell_map, observations, match, prediction)
 
-    def _is_dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> bool:
-        """Whether movers rather carried the match than odometry errs: by it, and what is known.
-
-        Where old surface held the match and odometry denies it, the map alone decides.
+    def _dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> float:
+        """How likely movers carried the match off, and not odometry: by the map and by the
+        agreement; by the map alone where old surface held the match. 0 where odometry agrees.
         """
         if not self._agreement.suspected:
-            return False
+            return 0.0
         dragged = max(self._agreement.dragged(), 0.5)
         poses = match.T_map_robot, self._agreement.put_back(match.T_map_robot)
         looks = [Evidence().add(cell_map, observations, pose) for pose in poses]
         here, back = probabilities([self._odds.evidence(look) for look in looks])
-        return dragged * back > (1.0 - dragged) * here
+        return dragged * back / max(dragged * back + (1.0 - dragged) * here, LEAST_P)
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
         """A scan without a return says nothing: odometry alone."""
@@ -230,7 +231,7 @@ class Belief:
         few = replace(everyone, points_robot=points, weights=weights)
         slip = self._agreement.shown(spread(self._config.slip_m, self._config.slip_rad))
         # not what adds up where nothing shows it, but odometry's drift since the doubt began
-        loose = inverted(slip + prediction.step + episode.drift)
+        loose = inverted(slip + prediction.loosened + episode.drift)
         reach_m = min(SIGMAS * math.sqrt(max(episode.drift[0, 0], episode.drift[1, 1])), WIDEST_M)
         window = SearchWindow(reach_m=max(reach_m, numbers.near_m), turn_rad=numbers.near_rad)
         start = prediction.T_map_robot
@@ -305,11 +306,12 @@ class Belief:
                 vote = observations.mean_vote
                 self._agreement.take(prediction, found.T_map_robot, vote, in_doubt=True)
             often = prediction.elapsed <= PAUSE_S  # else no match follows what moves
-            dragged = goes_on and often and self._is_dragged(cell_map, observations, found)
-            episode.matched = goes_on and not dragged
+            asked = goes_on and often
+            dragged = self._dragged(cell_map, observations, found) if asked else 0.0
+            episode.matched = goes_on and dragged <= 0.5
             match = found if episode.matched else replace(match, matched=found.matched)
-            if dragged:
-                pose = self._agreement.undragged(found.T_map_robot)
+            if dragged > 0.5:
+                pose = self._agreement.undragged(found.T_map_robot, dragged)
                 match = replace(match, T_map_robot=pose)
         episode.before = episode.evidence.copy()
         episode.evidence.add(cell_map, observations, match.T_map_robot)
@@ -388,7 +390,7 @@ class Belief:
         self._agreement.forget()
         slipped = place.prior > episode.carried_there
         if slipped:
-            wide = spread(self._config.slip_m, self._config.slip_rad) + episode.drift
+            wide = spread(self._config.slip_m, self._config.slip_rad)
             return Judged(
                 match=replace(place.match, slipped=True),
                 prediction=replace(prediction, covariance=wide),

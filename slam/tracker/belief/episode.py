@@ -20,7 +20,7 @@ from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse
 from slam.tracker.belief.posterior import MOST_NATS, Odds, probabilities
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import used
+from slam.tracker.cells import MOST_OFF, used
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
 
@@ -70,8 +70,14 @@ class Episode:
     def local(self) -> CellMap:
         """The copy, made when it is first asked for."""
         if self._local is None:
-            self._local = self.cell_map.twin()
+            self._local = self._copy()
         return self._local
+
+    def _copy(self) -> CellMap:
+        """In which it is not known by how much the map is off that becomes known."""
+        copy = self.cell_map.twin()
+        copy.off_cm = MOST_OFF
+        return copy
 
     def note_break(self, corrected: float, lost: float) -> None:
         """Nats against a match as the motion: the most of any scan counts."""
@@ -81,7 +87,7 @@ class Episode:
     def write(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:
         """Let the copy see a scan; grown by ``MOST_NEW`` blocks, it is begun anew."""
         if used(self.local.cells) > used(self.cell_map.cells) + MOST_NEW:
-            self._local = self.cell_map.twin()
+            self._local = self._copy()
         rasterise(self.local, observations, T_map_robot)
         T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
         step = min(elapsed, self.local.config.map.longest_look_s)

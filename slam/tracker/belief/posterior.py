@@ -91,7 +91,7 @@ class Odds:
 
         The place is the best of all that a search tells apart by ``found`` (3, 3).
         """
-        best_of = _determinant(drift + found) / _determinant(found)
+        best_of = max(_determinant(drift + found) / _determinant(found), 1.0)
         return -0.5 * (squared(off, drift) + math.log(best_of))
 
 

@@ -16,6 +16,7 @@ from slam import se2
 from slam.frames import Float
 from slam.frontend.odometry_prior import Prediction, inverted, turned, upper_inverted
 from slam.tracker.standing.config import StandingConfig
+from slam.tracker.uncertainty.covariances import carried
 
 
 class Pull(NamedTuple):
@@ -51,7 +52,7 @@ class Agreement:
     put back by F, the sum of c.
 
     ratio   that
-    denied  the same of F: what old surface held may be a board that stood for long, and now moves
+    denied  F' (V + R)^-1 F / 3, whatever held: old surface may be a board that now moves
     """
 
     def __init__(self, config: StandingConfig, pull: Pull = Pull()) -> None:  # noqa: B008 (frozen)
@@ -82,16 +83,22 @@ class Agreement:
         self._held = [keep * a + b for a, b in zip(self._held, old.tolist(), strict=True)]
         self._looks = keep * self._looks + 1.0
 
-    def shown(self, covariance: Float) -> Float:
+    def shown(self, covariance: Float, along_rad: float | None = None) -> Float:
         """(3, 3) part of an error of the pose with this covariance C that old surface shows.
 
-        ``C - (1 / C + G / (holds C_xx))^-1``: nothing along a bare corridor, though a scan among
-        people fits best somewhere there.
+        ``C - (1 / C + G / (holds s^2))^-1``, 2 s^2 the variance of the position: nothing along a
+        bare corridor, though a scan among people fits best somewhere there. ``along_rad``: G says
+        nothing along this direction of the map either.
         """
-        times = 1.0 / (self._pull.holds * float(covariance[0, 0]) * max(self._looks, 1.0))
+        variance = 0.5 * float(covariance[0, 0] + covariance[1, 1])
+        times = 1.0 / (self._pull.holds * variance * max(self._looks, 1.0))
         xx, xy, xt, yy, yt, tt = (v * times for v in self._held)
-        known = inverted(covariance) + np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
-        return covariance - inverted(known)
+        known = np.array([[xx, xy, xt], [xy, yy, yt], [xt, yt, tt]])
+        if along_rad is not None:
+            across = np.empty((3, 3))
+            carried(known, np.zeros(3), math.cos(along_rad), math.sin(along_rad), across)
+            known = across
+        return covariance - inverted(inverted(covariance) + known)
 
     def _left_to_movers(
         self, vote: float, off: Float, in_doubt: bool
@@ -136,7 +143,10 @@ class Agreement:
 
     @property
     def suspected(self) -> bool:
-        """Whether odometry denies the corrections of the window. One alone is no sum."""
+        """Whether odometry denies the corrections of the window, whoever made them.
+
+        Where scans come more seldom than a window there is but one, which is no sum.
+        """
         often = self._elapsed_s <= self._config.window_s
         return self.dragged() > 0.5 or (often and 0.0 < self._config.disagreed < self.denied)
 
@@ -158,14 +168,13 @@ class Agreement:
         pose[2] = se2.wrap(float(pose[2]))
         return pose
 
-    def undragged(self, T_map_robot: Float) -> Float:
-        """(3,) the pose put back, from which the sums begin anew.
+    def undragged(self, T_map_robot: Float, dragged: float) -> Float:
+        """(3,) the pose put back, from which the sums begin anew; ``dragged``: how likely it is.
 
         With the rest of the probability the matches were right: the pose is off by F now, and
         ``left_behind`` says so.
         """
         pose = self.put_back(T_map_robot)
-        dragged = self.dragged()
         put_back = dragged * (1.0 - dragged) * np.multiply.outer(self._whole, self._whole)
         held, looks = self._held, self._looks
         self.forget()

@@ -26,7 +26,8 @@ from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import carried, followed
 from slam.tracker.uncertainty.residuals import Evidence
 
-LEAST = 1e-9  # m^2, rad^2: numerical guard
+LEAST = 1e-9  # m^2: numerical guard
+SINGULAR = np.diag([1e-6, 1e-6, 1e-8])  # m^2, m^2, rad^2: numerical guard
 TIMES_OFF = 2.0  # variances: old surface was off by so much less than the map is now; set by hand
 
 
@@ -37,8 +38,8 @@ class PoseCovariance:
     shared_m2     m^2, variance of the residual that neighbouring points of a surface share
     newest_drift  (3, 3) what the latest frame added to the error of the map
     by_movers_m   deviation of the position by what movers may have carried map and robot off
-    p_off         probability that they carried them by more than ``standing.alert_m``, if all along
-                  one direction, as along a corridor: the most
+    p_off         probability that they carried them by more than ``standing.alert_m``: along one
+                  direction, as in a corridor, or round about, whichever is more
     unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
                   the noise of their beams would
     unseen_s      s since all directions were observable, lost ones too; it fades once they are
@@ -162,26 +163,30 @@ class PoseCovariance:
         self.by_movers_m = _far(self._by_movers if now is None else self._by_movers + now)
         least = min(self._alert_m, self.by_movers_m)
         deviations = self._alert_m / self.by_movers_m if least > 0.0 else math.inf
-        self.p_off = math.erfc(math.sqrt(0.5) * deviations)
+        along = math.erfc(math.sqrt(0.5) * deviations)
+        self.p_off = max(along, math.exp(-(deviations**2)))
 
     @property
     def off_m(self) -> float:
-        """Deviation of the map in view as a whole."""
-        return _far(self._drift)
+        """Deviation by which what is written now is off: the map's as a whole, and odometry's."""
+        return _far(self._drift + self._blind)
 
-    def held(self, shown: Callable[[Float], Float], off_m2: float, elapsed: float) -> None:
+    def held(self, shown: Callable[..., Float], off_m2: float, elapsed: float) -> None:
         """Old surface in view is off by what the map was off when it became long known, and so is
         the robot that is matched to it: ``off_m2``, the mean of the squares.
 
-        ``shown`` gives the part of a covariance (3, 3) that it shows. Only where the map was off by
-        far less: driving on, what comes into view is off by more than what is still there.
+        ``shown`` as of ``Agreement``. Only where the map was off by far less: driving on, what
+        comes into view is off by more than what is still there.
         """
-        share = 1.0 - TIMES_OFF * off_m2 / max(self.off_m**2, LEAST)
+        share = 1.0 - TIMES_OFF * off_m2 / max(_far(self._drift) ** 2, LEAST)
         share *= 1.0 - math.exp(-elapsed / self._window_s)
-        if share > 0.0 and _is_wide(self._drift):
-            self._drift = self._drift - share * shown(self._drift)
-            if _is_wide(self._by_movers):
-                self._by_movers = self._by_movers - share * shown(self._by_movers)
+        if share <= 0.0 or self.unobservable == 2:
+            return
+        self._drift, self._by_movers = (
+            covariance + share * (SINGULAR - shown(covariance + SINGULAR, self.along_rad))
+            for covariance in (self._drift, self._by_movers)
+        )
+        self.covariance = self._drift + self._blind + self._shared
 
     def turned(self, by: float) -> None:
         """The map frame was turned by ``by`` rad, and the robot with it."""
@@ -206,11 +211,6 @@ class PoseCovariance:
         self._weighed = keep * self._weighed + evidence.weighed
         self._in_view = keep * self._in_view + evidence.in_view
         self._looks = keep * self._looks + 1.0
-
-
-def _is_wide(covariance: Float) -> bool:
-    """Whether it can be divided by."""
-    return bool(min(covariance[0, 0], covariance[1, 1], covariance[2, 2]) > LEAST)
 
 
 def _far(covariance: Float) -> float:

@@ -21,7 +21,7 @@ from slam._jit import inner, uncounted
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import MASK, SHIFT, Cells, named
+from slam.tracker.cells import MASK, MOST_OFF, SHIFT, Cells, named
 
 # places in the sums of ``_look``
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
@@ -106,7 +106,7 @@ def _old(cells: Cells, u: float, v: float) -> tuple[float, float]:
     """Share in [0, 1] in which the surface next to (u, v) is an old one: its trace y, by its age.
 
     Of the cells within one of the nearest, the most: a point lies off the surface by its noise. And
-    by how much, m, the map was off when that cell became long known.
+    by how much, m, the map was off when that cell became long known, inf: unknown.
     """
     most, off = 0.0, 0.0
     rows, columns = cells.directory.shape
@@ -121,8 +121,8 @@ def _old(cells: Cells, u: float, v: float) -> tuple[float, float]:
                 share = age * age / (age * age + 1.0)
                 share *= float(cells.y[slot, j & MASK, i & MASK])
                 if share > most:
-                    most, off = share, 0.01 * cells.off[slot, j & MASK, i & MASK]
-    return most, off
+                    most, off = share, float(cells.off[slot, j & MASK, i & MASK])
+    return most, 0.01 * off if off < MOST_OFF else math.inf
 
 
 @inner
@@ -232,7 +232,8 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         geometry[1, 2] += f
         geometry[2, 2] += h
         old[6] += o * w
-        old[7] += o * w * old_off * old_off
+        if o * w > 0.0:
+            old[7] += o * w * old_off * old_off
         old[0] += o * a
         old[1] += o * b
         old[2] += o * e

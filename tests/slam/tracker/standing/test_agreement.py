@@ -165,7 +165,7 @@ def test_a_pose_that_was_put_back_may_have_been_right() -> None:
     """Off by the whole sum with the rest of the probability, said once; the sums begin anew."""
     agreement = fed(np.tile([SIGMA[0], 0.0, 0.0], (50, 1)))
     p, spread = agreement.dragged(), agreement.covariance()
-    pose = agreement.undragged(np.zeros(3))
+    pose = agreement.undragged(np.zeros(3), agreement.dragged())
     assert pose[0] ** 2 == pytest.approx(spread[0, 0])
     assert agreement.left_behind() == pytest.approx(p * (1.0 - p) * spread)
     assert not agreement.left_behind().any()
@@ -180,13 +180,13 @@ def test_a_pose_is_put_back_to_where_odometry_leads_however_little_old_surface_h
     whole = rows[0] * (1.0 - keep**20) / (1.0 - keep)
     assert abs(agreement.by_movers[0]) < 0.5 * whole[0]
     pose = np.array([1.0, 2.0, 0.5])
-    assert agreement.undragged(pose) == pytest.approx(pose - whole, rel=1e-9)
-    assert agreement.undragged(pose) == pytest.approx(pose)  # all is taken back once
+    assert agreement.undragged(pose, 0.7) == pytest.approx(pose - whole, rel=1e-9)
+    assert agreement.undragged(pose, 0.7) == pytest.approx(pose)  # all is taken back once
     turned.turned(turn)
     c, s = math.cos(turn), math.sin(turn)
     x, y, t = whole.tolist()
     expected = [-(c * x - s * y), -(s * x + c * y), -t]
-    assert turned.undragged(np.zeros(3)) == pytest.approx(expected)
+    assert turned.undragged(np.zeros(3), 0.7) == pytest.approx(expected)
 
 
 def test_a_robot_that_was_set_elsewhere_starts_anew() -> None:
