@@ -48,9 +48,10 @@ class StandingConfig(Settings):
     )
     disagreed: float = number(
         3.0, "ratio", "of what movers may have made of corrections over what odometry may be off, "
-        "squared, at which they are as likely as not; 0: never asked", SEEDS,
+        "squared, at which they are as likely as not; of all corrections: the map is asked; 0: "
+        "never asked", SEEDS,
     )  # fmt: skip
-    window_s: float = number(2.0, "s", "corrections are summed over it", SEEDS, low=1e-3)
+    window_s: float = number(2.0, "s", "corrections are summed over it; old surface takes as long to hold", SEEDS, low=1e-3)
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
     alert_m: float = number(
