@@ -95,7 +95,9 @@ class RelocaliseConfig(Settings):
     least_near: float = number(
         20.0, "weight", "in view from which on a slip is searched: 2 m of surface"
     )
-    near_m: float = number(0.6, "m", "farthest that a slip is searched; after long doubt up to 1.5 m", high=20.0)
+    near_m: float = number(
+        0.6, "m", "farthest that a slip is searched; after long doubt up to 1.5 m", high=20.0
+    )
     near_rad: float = number(0.6, "rad", "farthest turn that is searched", low=1e-3, high=3.2)
     near_points: int = number(60, "points", "about so many are searched with", low=1, high=100_000)
     again_near_s: float = number(0.3, "s", "between two such searches")

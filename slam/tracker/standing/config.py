@@ -51,7 +51,13 @@ class StandingConfig(Settings):
         "squared, at which they are as likely as not; of all corrections: the map is asked; 0: "
         "never asked", SEEDS,
     )  # fmt: skip
-    window_s: float = number(2.0, "s", "corrections are summed over it; old surface takes as long to hold", SEEDS, low=1e-3)
+    window_s: float = number(
+        2.0,
+        "s",
+        "corrections are summed over it; old surface takes as long to hold",
+        SEEDS,
+        low=1e-3,
+    )
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
     alert_m: float = number(
