@@ -72,10 +72,10 @@ class _Recorder(Agreement):
         self.told.append((Agreement.take, (prediction, T_map_robot.copy(), vote, in_doubt)))
         super().take(prediction, T_map_robot, vote, in_doubt)
 
-    def undragged(self, T_map_robot: Float) -> Float:
+    def undragged(self, T_map_robot: Float, dragged: float) -> Float:
         kept = list(self.told)
-        pose = super().undragged(T_map_robot)
-        self.told = [*kept, (Agreement.undragged, (T_map_robot.copy(),))]
+        pose = super().undragged(T_map_robot, dragged)
+        self.told = [*kept, (Agreement.undragged, (T_map_robot.copy(), dragged))]
         return pose
 
 
