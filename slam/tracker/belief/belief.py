@@ -33,8 +33,9 @@ from slam.tracker.standing.agreement import Agreement
 
 DENIED = 14.2  # squared, in variances, of three numbers: odometry allows less in 997 of 1000
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
-LEAST_P = 1e-300  # numerical guard
-SIGMAS, WIDEST_M = 2.0, 1.5  # of what odometry may be off, how far is searched; set by hand
+LEAST_P = 1e-300  # probability: numerical guard
+SIGMAS = 2.0  # deviations of odometry's drift since the doubt began that are searched; set by hand
+WIDEST_M = 1.5  # m, farthest that this widens a search nearby; set by hand
 LEFT_S = 3.0  # for so long nothing of the map is in view: no crowd in passing; set by hand
 
 

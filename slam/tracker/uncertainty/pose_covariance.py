@@ -38,8 +38,8 @@ class PoseCovariance:
     shared_m2     m^2, variance of the residual that neighbouring points of a surface share
     newest_drift  (3, 3) what the latest frame added to the error of the map
     by_movers_m   deviation of the position by what movers may have carried map and robot off
-    p_off         probability that they carried them by more than ``standing.alert_m``: along one
-                  direction, as in a corridor, or round about, whichever is more
+    p_off         probability that they carried them by more than ``standing.alert_m``: in one
+                  direction, as in a corridor, or alike in all, whichever is more
     unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
                   the noise of their beams would
     unseen_s      s since all directions were observable, lost ones too; it fades once they are
