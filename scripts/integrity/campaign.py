@@ -43,6 +43,8 @@ def summary(cases: Sequence[Row]) -> dict[str, Any]:
     """Of the files of cases of one way and SLAM, or of several ways.
 
     hazardous     losses with at least one hazardous scan; ``most`` their share at most (95 %)
+    hazardous_protected  the same, of scans whose protection level is within the alert limit
+    protected     share of such scans that are trusted
     denied        share of the scans that are hazardous, and beyond 3 sigma of the covariance too
     moments       stretches of hazardous scans, of drives and losses; an hour, and at most (95 %)
     recover_s     of outages of drives and of losses after an event: never is infinite
@@ -53,7 +55,7 @@ def summary(cases: Sequence[Row]) -> dict[str, Any]:
     seen = [*drives, *events]
     scans, hazardous = _sum(seen, "scans"), sum(loss["hazardous"] > 0 for loss in losses)
     hours, moments = _sum(seen, "seconds") / S_PER_HOUR, _sum(seen, "stretches")
-    shares = {key: _sum(seen, key) for key in ("denied", "misleading", "unavailable")}
+    shares = {key: _sum(seen, key) for key in ("denied", "misleading", "unavailable", "protected")}
     took = [float(s) for drive in drives for s in drive["outages"]]
     took += [float(loss["recovered_s"]) for loss in events]
     driven = _sum(drives, "scans")
@@ -67,6 +69,7 @@ def summary(cases: Sequence[Row]) -> dict[str, Any]:
         "losses": len(losses),
         "hazardous": hazardous,
         "most": most_of_trials(hazardous, len(losses)),
+        "hazardous_protected": sum(loss["hazardous_protected"] > 0 for loss in losses),
         "scans": scans,
         "hazardous_scans": _share(_sum(seen, "hazardous"), scans),
         **{key: _share(count, scans) for key, count in shares.items()},
@@ -133,6 +136,8 @@ TABLES: tuple[Mapping[str, Column], ...] = (
         "denied, %": _number("denied", 3, PERCENT),
         "misleading, %": _number("misleading", 3, PERCENT),
         "unavailable, %": _number("unavailable", 2, PERCENT),
+        "hazardous, 3 σ ≤ 0.5 m": _count("hazardous_protected"),
+        "such scans, %": _number("protected", 2, PERCENT),
         "wrong places": _count("wrong_places"),
         "hours": _number("hours", 2),
         "moments an hour": _moments_an_hour,

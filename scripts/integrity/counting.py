@@ -7,6 +7,9 @@ The words are those of the Stanford diagram of aviation, for each scan:
   nominal      it does, and is right
   misleading   it does, the error is beyond 3 sigma of its covariance, 0.1 to 0.5 m
   hazardous    it does, and the error is beyond the alert limit of 0.5 m, whatever the covariance
+
+Its protection level, 3 sigma of the covariance of position in the worst direction, is asked apart:
+who drives only where that is within the alert limit, too, meets fewer of these.
 """
 
 import math
@@ -39,6 +42,7 @@ class Moments:
     off      position errors, m; ``turned`` heading errors, rad
     trusted  by the SLAM itself
     told     not trusted, or within 3 sigma of the covariance of position
+    level    protection level, m
     """
 
     seconds: Float
@@ -46,6 +50,7 @@ class Moments:
     turned: Float
     trusted: Mask
     told: Mask
+    level: Float
 
     @classmethod
     def of(cls, run: Judged) -> "Moments":
@@ -56,6 +61,7 @@ class Moments:
             turned=run.pairs.errors[:, 2],
             trusted=run.converged(),
             told=run.is_told(),
+            level=run.protection_levels(),
         )
 
     def since(self, k: int) -> "Moments":
@@ -70,6 +76,10 @@ class Moments:
     def hazardous(self) -> Mask:
         """(n,) trusted and farther off than the alert limit."""
         return np.asarray(self.trusted & (self.off > ALERT_M))
+
+    def protected(self) -> Mask:
+        """(n,) trusted, and the protection level is within the alert limit."""
+        return np.asarray(self.trusted & (self.level <= ALERT_M))
 
     def misleading(self) -> Mask:
         """(n,) trusted, not hazardous, off by more than ``SILENT_M`` and more than it admits."""

@@ -185,6 +185,8 @@ def _loss(run_: Moments, *, trusted_before: bool) -> Row:
         "hazardous": int(hazardous.sum()),
         "denied": int((hazardous & ~run_.told).sum()),
         "stretches": stretches(hazardous),
+        "hazardous_protected": int((hazardous & run_.protected()).sum()),
+        "protected": int(run_.protected().sum()),
         "misleading": int(run_.misleading().sum()),
         "unavailable": int((~run_.trusted).sum()),
         "wrong_places": run_.wrong_places(trusted_before),

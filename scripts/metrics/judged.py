@@ -152,6 +152,17 @@ class Judged:
         beyond = scaled >= SILENT_SIGMAS**2 * determinants
         return np.asarray(~(self.converged() & beyond))
 
+    def protection_levels(self) -> Float:
+        """(n,) ``SILENT_SIGMAS`` of the covariance of position in its worst direction, m;
+        ``InvalidValueError`` for a run without covariances.
+        """
+        if self.covariances is None:
+            raise InvalidValueError("this metric needs a run with covariances")
+        P = self.covariances[:, :2, :2]
+        half, across = 0.5 * (P[:, 0, 0] - P[:, 1, 1]), P[:, 0, 1]
+        largest = 0.5 * (P[:, 0, 0] + P[:, 1, 1]) + np.sqrt(half * half + across * across)
+        return np.asarray(SILENT_SIGMAS * np.sqrt(largest))
+
     def nees_over_3(self) -> float | None:
         """Mean after ``SETTLED_S``; None where the SLAM claims nothing, as guests."""
         if self.covariances is None:

@@ -33,6 +33,7 @@ from slam.tracker.standing.agreement import Agreement
 
 DENIED = 14.2  # squared, in variances, of three numbers: odometry allows less in 997 of 1000
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
+NEGLIGIBLE = 0.01  # times frozen_above: so unlikely, all places beyond the alert limit are dropped
 LEAST_P = 1e-300  # probability: numerical guard
 SIGMAS = 2.0  # deviations of odometry's drift since the doubt began that are searched; set by hand
 WIDEST_M = 1.5  # m, farthest that this widens a search nearby; set by hand
@@ -81,11 +82,13 @@ class Belief:
         self._agreement = agreement
         self._config, self._numbers = config.belief, config.tracking.relocalise
         self._give_up_s = config.tracking.give_up_s
+        self._alert_m = config.standing.alert_m
         self._matcher, self._match, self._usual = matcher, match, usual
         self._odds = Odds(config.belief, config.carried_per_h)
         self._episode: Episode | None = None
         self.p_lost, self.status, self.busy = 0.0, Status.TRACKING, 0.0
         self._p_off = 0.0  # that the robot is not where its motion led
+        self._p_far = 0.0  # nor within the alert limit of it
         self._likeliest: int | None = None  # of the places that are followed, if one is
         self._since_near_s = np.inf
         self._suspect = False
@@ -116,7 +119,8 @@ class Belief:
         if not len(observations.points_robot):
             return self._blind(cell_map, prediction)
         if self._episode is not None:
-            return self._go_on(self._episode, cell_map, T_map_before, observations, prediction)
+            episode = self._episode
+            return self._go_on(episode, episode.cell_map, T_map_before, observations, prediction)
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
@@ -167,6 +171,9 @@ class Belief:
     def learn(self, observations: Observations, judged: Judged, look: Look) -> None:
         """The map took a scan in, and ``look`` is what that said of it."""
         match, elapsed = judged.match, judged.prediction.elapsed
+        if self._episode is not None:
+            self._usual.learn(match, elapsed)
+            return
         here = self._odds.evidence(look) - max(self._broken(observations, judged.prediction, match))
         self._usual.learn(match, elapsed)
         self._usual.follow(match, observations, elapsed)
@@ -273,7 +280,13 @@ class Belief:
         T_map_robot, off = match.T_map_robot, prediction.off(match.T_map_robot)
         if episode.matched and squared(off, prediction.step) <= DENIED:
             increment = se2.between(T_map_before, T_map_robot)
-            moved = replace(prediction, T_map_robot=T_map_robot, increment=increment)
+            # as sure as both together: among people a few returns must turn no place
+            match_may = self._agreement.own + np.multiply.outer(off, off)
+            step = inverted(inverted(prediction.step) + inverted(match_may))
+            moved = prediction.changed(
+                T_map_robot=T_map_robot, increment=increment, covariance=step,
+                loosened=np.zeros((3, 3)),
+            )  # fmt: skip
         everyone = observations.with_votes(None)
         new = episode.places.step(everyone, moved, self._share(), episode.evidence)
         new = [self._told_nearby(episode, place, match) for place in new]
@@ -305,7 +318,8 @@ class Belief:
             self._usual.follow(found, observations, prediction.elapsed)
             if goes_on:
                 vote = observations.mean_vote
-                self._agreement.take(prediction, found.T_map_robot, vote, in_doubt=True)
+                doubt = self._p_off > self._config.frozen_above
+                self._agreement.take(prediction, found.T_map_robot, vote, in_doubt=doubt)
             often = prediction.elapsed <= PAUSE_S  # else no match follows what moves
             asked = goes_on and often
             dragged = self._dragged(cell_map, observations, found) if asked else 0.0
@@ -327,6 +341,13 @@ class Belief:
             if is_same(place.match, episode.match)
         )
         self.p_lost = self._p_off = max(0.0, 1.0 - self._weighed.followed - sum(at_same))
+        here = episode.match.T_map_robot
+        far = (
+            p
+            for place, p in zip(episode.places.followed, self._weighed.places, strict=True)
+            if math.dist(place.match.T_map_robot[:2], here[:2]) > self._alert_m
+        )
+        self._p_far = self._weighed.unknown + sum(far)
         self._likeliest = None
         for k, p in enumerate(self._weighed.places):
             if 1.0 - p < self.p_lost:
@@ -367,8 +388,9 @@ class Belief:
             taken = (goes_on and p >= sure) or (left and p >= 1.0 - LENIENT * (1.0 - sure))
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
                 return self._found(place, episode, cell_map, prediction, writes=left)
-        if 1.0 - self._p_off >= sure:
-            self._episode = None
+        if 1.0 - self._p_off >= sure:  # a search may still find where the robot was carried
+            if self._p_far <= NEGLIGIBLE * self._config.frozen_above:
+                self._episode = None
             return self._settled(episode.local, match, prediction)
         if episode.elapsed_s > prediction.elapsed:
             episode.write(observations, match.T_map_robot, prediction.elapsed)

@@ -62,6 +62,10 @@ class BeliefConfig(Settings):
     unsearched: float = number(
         8.0, "nats", "that a place explains which a search not done may still find, after a break",
     )  # fmt: skip
+    alike: float = number(
+        8.0, "nats", "that it costs where motion led to look like a known place elsewhere: it may "
+        "be new to the map",
+    )  # fmt: skip
     slips_per_m: float = number(
         3e-4,
         "1/m",

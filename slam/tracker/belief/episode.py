@@ -123,12 +123,23 @@ class Episode:
         """The posterior."""
         places = self.places.followed
         weights = [self.weight(place) for place in places]
-        here = self._odds.evidence(self.evidence) - self.broken
         slipped = [k for k, place in enumerate(places) if place.prior > self.carried_there]
+        elsewhere = [place for place in places if place.prior <= self.carried_there]
+        here = self._here(elsewhere) - self.broken
         here = self._compared(slipped, here, weights)
         nearby = max((weights[k] for k in slipped), default=-MOST_NATS)
         of_here, unknown, *others = probabilities([here, self._unknown(nearby), *weights])
         return Weighed(followed=of_here, places=others, unknown=unknown)
+
+    def _here(self, elsewhere: list[Place]) -> float:
+        """Nats of what scans say of where motion led.
+
+        A room that is new to the map confirms nothing, and may look like one that it knows.
+        """
+        odds, own = self._odds, self.evidence
+        best = max((odds.confirmed(place.evidence.known_m) for place in elsewhere), default=0.0)
+        known = max(odds.confirmed(own.known_m), best - odds.config.alike)
+        return known - odds.denied(own.through_m)
 
     def _compared(self, nearby: list[int], here: float, weights: list[float]) -> float:
         """Nats of where motion led; ``weights`` of places ``nearby`` change with it.

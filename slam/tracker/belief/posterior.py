@@ -39,13 +39,17 @@ class Odds:
 
     def evidence(self, of: Evidence | Look) -> float:
         """Nats for a place: a log(1 + C / c) - b sqrt(D)."""
-        config = self.config
         known, through = (of.known, of.through) if isinstance(of, Look) else (
             of.known_m, of.through_m
         )  # fmt: skip
-        one_view, chance = min(known, config.linear_m), config.confirmed_m
-        more = math.log1p(one_view / chance) + (known - one_view) / (chance + one_view)
-        return config.confirmed * more - self.denied(through)
+        return self.confirmed(known) - self.denied(through)
+
+    def confirmed(self, known_m: float) -> float:
+        """Nats for a place: the logarithm of so much surface; a further view adds in proportion."""
+        config = self.config
+        one_view, chance = min(known_m, config.linear_m), config.confirmed_m
+        more = math.log1p(one_view / chance) + (known_m - one_view) / (chance + one_view)
+        return config.confirmed * more
 
     def denied(self, through_m: float) -> float:
         """Nats against a place: a metre more says less than the one before."""

@@ -142,6 +142,11 @@ class Agreement:
         return x * (a * x + 2.0 * (b * y + c * t)) + y * (d * y + 2.0 * e * t) + f * t * t
 
     @property
+    def own(self) -> Float:
+        """(3, 3) R, what a match itself may be off."""
+        return np.diag(self._own)
+
+    @property
     def suspected(self) -> bool:
         """Whether odometry denies the corrections of the window, whoever made them.
 

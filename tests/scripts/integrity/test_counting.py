@@ -21,7 +21,7 @@ from slam.errors import InvalidValueError
 HZ = 10.0
 
 
-def moments(off, trusted=None, told=None, turned=None) -> Moments:
+def moments(off, trusted=None, told=None, turned=None, level=None) -> Moments:
     n = len(off)
     every = np.ones(n, dtype=bool)
     return Moments(
@@ -30,6 +30,7 @@ def moments(off, trusted=None, told=None, turned=None) -> Moments:
         turned=np.zeros(n) if turned is None else np.array(turned, float),
         trusted=every if trusted is None else np.array(trusted, bool),
         told=every if told is None else np.array(told, bool),
+        level=np.zeros(n) if level is None else np.array(level, float),
     )
 
 
@@ -43,6 +44,12 @@ def test_each_scan_has_its_place_in_the_diagram():
     assert run.hazardous().tolist() == [False, False, False, True, True, False]
     assert run.right().tolist() == [True, True, True, False, False, False]
     assert run.right(0.1).tolist() == [True] + 5 * [False]
+
+
+def test_who_heeds_the_protection_level_drives_less_and_meets_less():
+    run = moments(off=[0.1, 0.6, 0.6, 0.6], trusted=[1, 1, 1, 0], level=[0.6, 0.4, 0.7, 0.2])
+    assert run.protected().tolist() == [False, True, False, False]
+    assert (run.protected() & run.hazardous()).tolist() == [False, True, False, False]
 
 
 def test_a_wrong_place_is_one_that_is_come_to_be_trusted():

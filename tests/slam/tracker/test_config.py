@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("96e8f9e138f2", "f4935888eab7")),
-        (OccupancyConfig, ["grid"], ("856be25d755a", "43a596e5d5b8")),
+        (ShuntingConfig, [], ("19ec52787b6f", "8341c1c6d78e")),
+        (OccupancyConfig, ["grid"], ("b8df8356a89b", "07cae4af8f26")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

@@ -86,6 +86,23 @@ def test_a_place_a_hand_away_speaks_for_the_motion_against_places_elsewhere() ->
     assert episode.weighed().places[0] > 100.0 * episode.weighed().followed
 
 
+def test_a_room_that_is_new_may_look_like_one_that_is_known_unless_the_map_denies_it() -> None:
+    """However much more of the known one is confirmed."""
+    odds = Odds(CONFIG.belief, CONFIG.carried_per_h)
+    episode = Episode(known(NETWORK, ROOM, 1.0, ORIGIN), Matcher(CONFIG), odds, 0.1)
+    elsewhere, carried = place(5.0, 0.0), episode.carried_there
+    episode.places.followed = [elsewhere]
+    for known_m in (15.0, 30.0, 60.0):
+        elsewhere.evidence.known_m = known_m
+        one = episode.weighed()
+        lead = math.log(one.places[0] / one.followed)
+        assert lead == pytest.approx(CONFIG.belief.alike + carried)
+    episode.evidence.through_m = 20.0  # what stood where motion led is seen through
+    one = episode.weighed()
+    lead = math.log(one.places[0] / one.followed)
+    assert lead == pytest.approx(CONFIG.belief.alike + carried + odds.denied(20.0))
+
+
 def test_a_place_as_far_off_as_odometry_may_be_is_no_slip() -> None:
     """A robot that saw nothing of its map for a while need not have been carried to be far off."""
     odds = Odds(CONFIG.belief, CONFIG.carried_per_h)

@@ -13,7 +13,9 @@ from scripts.integrity import plane
 from scripts.integrity.plane import StreamSpec
 from slam import se2
 from slam.frontend.observations import observe
+from slam.frontend.odometry_prior import Prediction
 from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.tracker.belief.belief import NEGLIGIBLE
 from slam.tracker.belief.episode import Episode
 from slam.tracker.belief.places import Place, Places
 from slam.tracker.belief.posterior import Odds
@@ -104,6 +106,55 @@ def test_places_move_by_odometry_where_it_denies_the_match(monkeypatch: pytest.M
     assert belief._episode.matched
     _, since_first = belief._episode.places._kept[0]
     assert since_first == pytest.approx(np.zeros(3), abs=5e-3)
+
+
+def test_places_move_as_surely_as_match_and_odometry_together(
+    monkeypatch: pytest.MonkeyPatch,
+) -> None:
+    """Else a few returns among people turn a place by what odometry alone may be off."""
+    system, last = mapped(ROOMS, LONG_TURN)
+    config, plain = system.config.standing, Places.step
+    moved: list[tuple[Prediction, Prediction]] = []
+
+    def step(self: Places, *arguments: Any) -> list[Place]:
+        moved.append((arguments[1], odometry[-1]))
+        return plain(self, *arguments)
+
+    odometry, judge = [], system._belief.judge
+
+    def judged(*arguments: Any) -> Any:
+        odometry.append(arguments[3])
+        return judge(*arguments)
+
+    monkeypatch.setattr(Places, "step", step)
+    monkeypatch.setattr(system._belief, "judge", judged)
+    told(system, going_on(still(ROOMS, (3.0, 2.5, -1.0), 1.6), last))
+    followed = [(by, said) for by, said in moved if by is not said]
+    assert followed
+    for by, said in followed:
+        off = said.off(by.T_map_robot)
+        match_m = math.hypot(config.match_m, abs(float(off[0])))
+        assert by.step[0, 0] <= min(said.step[0, 0], match_m**2) + 1e-12
+        assert by.step[2, 2] <= said.step[2, 2] + 1e-12
+        assert np.linalg.eigvalsh(by.step).min() > 0.0
+
+
+@pytest.mark.parametrize("kind", SLAMS)
+def test_who_is_believed_again_follows_other_places_until_next_to_nothing_speaks_for_them(
+    kind: type[Tracker],
+) -> None:
+    """A search may find where the robot was carried only when it is believed elsewhere already."""
+    system = kind()
+    belief, least, believed = system._belief, NEGLIGIBLE * system.config.belief.frozen_above, 0
+    for frame in plane.frames(StreamSpec(kind="boards10", seed=3, seconds=40.0)):
+        before, estimate = belief.certain, system.update(frame.without_truth())
+        found = estimate.diagnostics["state"] == "relocated"
+        if not belief.certain and estimate.converged:
+            believed += 1
+            assert belief._p_off <= system.config.belief.frozen_above
+        if belief.certain and not before:
+            assert found or belief._p_far <= least
+    assert believed
 
 
 def test_the_covariance_of_a_lost_robot_covers_all_that_it_has_seen() -> None:
