@@ -72,6 +72,7 @@ class Tracker(abc.ABC):
         new_submap = partial(self._new_submap, self.config)
         self._loops = Loops(self.config, self._matcher, new_submap, new_map)
         self._trusted = True  # the pose of the frame before
+        self._doubted_since = 0  # frame
         self._path = PosePath()
 
     @staticmethod
@@ -179,8 +180,13 @@ class Tracker(abc.ABC):
         if observations.weight >= relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = prediction.changed(carried=self._pose_covariance.odometry_part(motion))
+        doubt = self._belief.doubt
         judged = self._belief.judge(self.cell_map, self._T_map_robot, observations, prediction)
         self.cell_map = judged.cell_map
+        if judged.restored:
+            self._loops.unwrite(self._doubted_since)
+        if self._belief.doubt is not doubt:
+            self._doubted_since = self._loops.n_frames
         if judged.state is State.RELOCATED:
             self._pose_covariance.relocated(coarse(relocalise))
         return judged

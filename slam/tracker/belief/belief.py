@@ -49,6 +49,7 @@ class Judged:
     cell_map    the map to go on in; ``writes``: it takes the scan in
     followed    whether the pose is a match to a map, be it the local copy
     likeliest   (3,) pose of the likeliest place, if that is not where motion led
+    restored    whether the map is that of before the doubt: what was written since is not in it
     """
 
     match: Match
@@ -58,6 +59,7 @@ class Judged:
     writes: bool = False
     followed: bool = True
     likeliest: Float | None = None
+    restored: bool = False
 
 
 class Belief:
@@ -105,6 +107,11 @@ class Belief:
         """Whether no other place is followed."""
         return self._episode is None
 
+    @property
+    def doubt(self) -> Episode | None:
+        """Since which other places are followed, if any are."""
+        return self._episode
+
     def judge(
         self,
         cell_map: CellMap,
@@ -114,13 +121,12 @@ class Belief:
     ) -> Judged:
         """Where the robot is; ``T_map_before``: where it was at the scan before."""
         self._since_near_s += prediction.elapsed
-        self.busy = 0.0 if self._episode is None else 1.0
+        episode, self.busy = self._episode, 0.0 if self._episode is None else 1.0
         before, self._latest = self._latest, observations.with_votes(None)
         if not len(observations.points_robot):
             return self._blind(cell_map, prediction)
-        if self._episode is not None:
-            episode = self._episode
-            return self._go_on(episode, episode.cell_map, T_map_before, observations, prediction)
+        if episode is not None and self._p_off > self._config.frozen_above:
+            return self._go_on(episode, T_map_before, observations, prediction)
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         odd = self._suspect or self._usual.is_odd(match, observations)
@@ -129,19 +135,20 @@ class Belief:
             odd = odd or self._agreement.dragged() > 0.5
             pose = self._agreement.undragged(match.T_map_robot, dragged)
             match = unmatched(pose, matched=match.matched, score=0.0)
-        if not self._odds.asked or not odd:
+        if self._odds.asked and odd:
+            gone, now = 0.0, (self._latest, match.T_map_robot)
+            if before is not None and prediction.elapsed <= PAUSE_S:
+                gone = vanished(cell_map, (before, T_map_before), now)
+            begun = self._begun(cell_map, observations, prediction, match, gone)
+            if self._p_off > self._config.frozen_above:  # what was followed before is believed
+                self._episode, begun.matched, self.busy = begun, True, 1.0
+                self._usual.follow(match, observations, prediction.elapsed)
+                begun.places.remember(self._latest)
+                begun.write(observations, match.T_map_robot, prediction.elapsed)
+                return self._decided(begun, observations, match, prediction)
+        if episode is None:
             return self._settled(cell_map, match, prediction)
-        gone, now = 0.0, (self._latest, match.T_map_robot)
-        if before is not None and prediction.elapsed <= PAUSE_S:
-            gone = vanished(cell_map, (before, T_map_before), now)
-        episode = self._begun(cell_map, observations, prediction, match, gone)
-        if self._p_off <= self._config.frozen_above:
-            return self._settled(cell_map, match, prediction)
-        self._episode, episode.matched, self.busy = episode, True, 1.0
-        self._usual.follow(match, observations, prediction.elapsed)
-        episode.places.remember(self._latest)
-        episode.write(observations, match.T_map_robot, prediction.elapsed)
-        return self._decided(episode, cell_map, observations, match, prediction)
+        return self._go_on(episode, T_map_before, observations, prediction, match)
 
     def _dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> float:
         """How likely movers carried the match off, and not odometry: by the map and by the
@@ -171,14 +178,12 @@ class Belief:
     def learn(self, observations: Observations, judged: Judged, look: Look) -> None:
         """The map took a scan in, and ``look`` is what that said of it."""
         match, elapsed = judged.match, judged.prediction.elapsed
-        if self._episode is not None:
-            self._usual.learn(match, elapsed)
-            return
         here = self._odds.evidence(look) - max(self._broken(observations, judged.prediction, match))
         self._usual.learn(match, elapsed)
         self._usual.follow(match, observations, elapsed)
-        self.p_lost = probabilities([here, self._odds.carried(elapsed)])[1]
-        self._suspect = self._odds.asked and self.p_lost > self._config.frozen_above
+        p_lost = probabilities([here, self._odds.carried(elapsed)])[1]
+        self.p_lost = p_lost if self._episode is None else max(p_lost, self.p_lost)
+        self._suspect = self._odds.asked and p_lost > self._config.frozen_above
         self._tell(look.through)
 
     def _broken(
@@ -267,22 +272,28 @@ class Belief:
     def _go_on(
         self,
         episode: Episode,
-        cell_map: CellMap,
         T_map_before: Float,
         observations: Observations,
         prediction: Prediction,
+        believed: Match | None = None,
     ) -> Judged:
-        """Another scan of an episode."""
+        """Another scan of an episode; ``believed``: its match, where the pose is believed."""
         episode.moved(prediction)
-        match = self._followed(episode, cell_map, observations, prediction)
+        if believed is None:
+            match = self._followed(episode, observations, prediction)
+        else:
+            match, episode.matched = believed, True
+        episode.see(observations, match)
         moved = prediction
         # the old map may have pulled the match before: from there the next one jumps
         T_map_robot, off = match.T_map_robot, prediction.off(match.T_map_robot)
         if episode.matched and squared(off, prediction.step) <= DENIED:
             increment = se2.between(T_map_before, T_map_robot)
             # as sure as both together: among people a few returns must turn no place
-            match_may = self._agreement.own + np.multiply.outer(off, off)
-            step = inverted(inverted(prediction.step) + inverted(match_may))
+            known = inverted(prediction.step)
+            shown = inverted(known + match.tau * match.information)  # no more than both showed
+            match_may = shown + self._agreement.own + np.multiply.outer(off, off)
+            step = inverted(known + inverted(match_may))
             moved = prediction.changed(
                 T_map_robot=T_map_robot, increment=increment, covariance=step,
                 loosened=np.zeros((3, 3)),
@@ -292,10 +303,10 @@ class Belief:
         new = [self._told_nearby(episode, place, match) for place in new]
         episode.places.keep(new, episode.weight, self._config.hopeless)
         if self._p_off > self._config.frozen_above:
-            self._search_near(episode, cell_map, observations, prediction, match)
+            self._search_near(episode, episode.cell_map, observations, prediction, match)
         episode.places.remember(everyone)
         self._weigh(episode)
-        return self._decided(episode, cell_map, observations, match, prediction)
+        return self._decided(episode, observations, match, prediction)
 
     def _share(self) -> float:
         prices = self._matcher.config.matching.budget
@@ -304,7 +315,6 @@ class Belief:
     def _followed(
         self,
         episode: Episode,
-        cell_map: CellMap,
         observations: Observations,
         prediction: Prediction,
     ) -> Match:
@@ -318,19 +328,15 @@ class Belief:
             self._usual.follow(found, observations, prediction.elapsed)
             if goes_on:
                 vote = observations.mean_vote
-                doubt = self._p_off > self._config.frozen_above
-                self._agreement.take(prediction, found.T_map_robot, vote, in_doubt=doubt)
+                self._agreement.take(prediction, found.T_map_robot, vote, in_doubt=True)
             often = prediction.elapsed <= PAUSE_S  # else no match follows what moves
             asked = goes_on and often
-            dragged = self._dragged(cell_map, observations, found) if asked else 0.0
+            dragged = self._dragged(episode.cell_map, observations, found) if asked else 0.0
             episode.matched = goes_on and dragged <= 0.5
             match = found if episode.matched else replace(match, matched=found.matched)
             if dragged > 0.5:
                 pose = self._agreement.undragged(found.T_map_robot, dragged)
                 match = replace(match, T_map_robot=pose)
-        episode.before = episode.evidence.copy()
-        episode.evidence.add(cell_map, observations, match.T_map_robot)
-        episode.match = match
         return match
 
     def _weigh(self, episode: Episode) -> None:
@@ -341,11 +347,10 @@ class Belief:
             if is_same(place.match, episode.match)
         )
         self.p_lost = self._p_off = max(0.0, 1.0 - self._weighed.followed - sum(at_same))
-        here = episode.match.T_map_robot
         far = (
             p
             for place, p in zip(episode.places.followed, self._weighed.places, strict=True)
-            if math.dist(place.match.T_map_robot[:2], here[:2]) > self._alert_m
+            if self._is_far(place.match, episode.match)
         )
         self._p_far = self._weighed.unknown + sum(far)
         self._likeliest = None
@@ -354,6 +359,11 @@ class Belief:
                 self._likeliest, self.p_lost = k, 1.0 - p
         place = None if self._likeliest is None else episode.places.followed[self._likeliest]
         self._tell((place or episode).evidence.through_m)
+
+    def _is_far(self, one: Match, other: Match) -> bool:
+        """Beyond the alert limit, or turned so much that it soon is."""
+        x, y, turn = (one.T_map_robot - other.T_map_robot).tolist()
+        return math.hypot(x, y) > self._alert_m or abs(se2.wrap(turn)) > self._numbers.same_rad
 
     def _elsewhere(self, episode: Episode | None) -> Float | None:
         """(3,) where the likeliest place is, if that is not where motion led."""
@@ -372,14 +382,13 @@ class Belief:
     def _decided(
         self,
         episode: Episode,
-        cell_map: CellMap,
         observations: Observations,
         match: Match,
         prediction: Prediction,
     ) -> Judged:
         """Whether one place is certain: where motion led, or another; else wait."""
         weighed, sure = self._weighed, 1.0 - self._config.frozen_above
-        waited_enough = episode.elapsed_s > self._give_up_s
+        waited_enough = episode.doubted_s > self._give_up_s
         for place, p in zip(episode.places.followed, weighed.places, strict=True):
             same = is_same(place.match, match) and p > weighed.followed
             goes_on = self._usual.share(place.match, observations) >= self._config.breaks
@@ -387,16 +396,19 @@ class Belief:
             left = waited_enough and place.unseen_s >= LEFT_S
             taken = (goes_on and p >= sure) or (left and p >= 1.0 - LENIENT * (1.0 - sure))
             if place.waited == 0 and (taken or (same and 1.0 - self._p_off >= sure)):
-                return self._found(place, episode, cell_map, prediction, writes=left)
+                return self._found(place, episode, prediction, writes=left)
         if 1.0 - self._p_off >= sure:  # a search may still find where the robot was carried
-            if self._p_far <= NEGLIGIBLE * self._config.frozen_above:
+            episode.believe(prediction.elapsed)
+            long = episode.believed_s > self._give_up_s
+            if long or self._p_far <= NEGLIGIBLE * self._config.frozen_above:
                 self._episode = None
             return self._settled(episode.local, match, prediction)
+        episode.believed_s = 0.0
         if episode.elapsed_s > prediction.elapsed:
             episode.write(observations, match.T_map_robot, prediction.elapsed)
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
         return Judged(
-            match=match, prediction=prediction, state=state, cell_map=cell_map,
+            match=match, prediction=prediction, state=state, cell_map=episode.cell_map,
             followed=episode.matched, likeliest=self._elsewhere(episode),
         )  # fmt: skip
 
@@ -404,7 +416,6 @@ class Belief:
         self,
         place: Place,
         episode: Episode,
-        cell_map: CellMap,
         prediction: Prediction,
         *,
         writes: bool,
@@ -417,10 +428,12 @@ class Belief:
             return Judged(
                 match=replace(place.match, slipped=True),
                 prediction=replace(prediction, covariance=wide),
-                state=State.TRACKING, cell_map=cell_map, writes=True,
+                state=State.TRACKING, writes=True,
+                cell_map=episode.local if episode.trusted else episode.cell_map,
             )  # fmt: skip
         return Judged(
-            match=place.match, prediction=prediction, state=State.RELOCATED, cell_map=cell_map,
+            match=place.match, prediction=prediction, state=State.RELOCATED,
+            cell_map=episode.cell_map, restored=True,
             writes=writes,  # off the map nothing else is there for the next scan to go on from
         )  # fmt: skip
 

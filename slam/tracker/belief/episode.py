@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From the first scan at which the pose is not certain until it is again.
+"""From the first scan at which the pose is not certain until next to nothing speaks for others.
 
-The map is not written meanwhile. The scans are written to a local copy of it, as if nothing were
+The map of before is kept as it is. The scans are written to a local copy of it, as if nothing were
 wrong, and matched there: where boards or people have closed in on the robot, nothing that it sees
 is in the map, and its scans still agree with one another. If the robot turns out to be where its
-motion led, the copy becomes the map.
+motion led, the copy is the map from then on; other places are followed a while yet.
 """
 
 import math
@@ -49,6 +49,8 @@ class Episode:
     broken    nats against the motion of any scan so far, at most; of them break_nats are those of
               returns that do not go on
     matched   whether the latest scan was matched to the copy
+    trusted   whether the pose was believed since it began: the copy is the map then
+    doubted_s, believed_s  s since the pose was last believed, and since it last was not
     drift     (3, 3) in the map: by how much odometry may be off, since it began
     """
 
@@ -59,7 +61,8 @@ class Episode:
         self.places = Places(cell_map, matcher)
         self.before = Evidence()
         self.broken = self.break_nats = 0.0
-        self.way_m = self.elapsed_s = 0.0
+        self.way_m = self.elapsed_s = self.doubted_s = self.believed_s = 0.0
+        self.trusted = False
         self.drift: Float = np.zeros((3, 3))
         self._found = coarse(matcher.config.tracking.relocalise)
         self._carried = odds.carried(elapsed)
@@ -84,10 +87,23 @@ class Episode:
         self.broken = max(self.broken, corrected, lost)
         self.break_nats = max(self.break_nats, lost)
 
+    def see(self, observations: Observations, match: Match) -> None:
+        """What a scan says of where motion led, on the map of before."""
+        self.before = self.evidence.copy()
+        self.evidence.add(self.cell_map, observations, match.T_map_robot)
+        self.match = match
+
+    def believe(self, elapsed: float) -> None:
+        """The pose is believed in this scan: odometry's drift begins anew."""
+        self.trusted, self.doubted_s, self.drift = True, 0.0, np.zeros((3, 3))
+        self.believed_s += elapsed
+
     def write(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:
-        """Let the copy see a scan; grown by ``MOST_NEW`` blocks, it is begun anew."""
-        if used(self.local.cells) > used(self.cell_map.cells) + MOST_NEW:
+        """Let the copy see a scan; grown by ``MOST_NEW`` blocks in doubt, it is begun anew."""
+        grown = used(self.local.cells) - used(self.cell_map.cells)
+        if grown > MOST_NEW and not self.trusted:
             self._local = self._copy()
+        self.local.off_cm = MOST_OFF
         rasterise(self.local, observations, T_map_robot)
         T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
         step = min(elapsed, self.local.config.map.longest_look_s)
@@ -96,6 +112,7 @@ class Episode:
     def moved(self, prediction: Prediction) -> None:
         """The robot has moved on."""
         self.elapsed_s += prediction.elapsed
+        self.doubted_s += prediction.elapsed
         x, y, turn = prediction.increment.tolist()
         self.way_m = math.hypot(x, y)
         before = prediction.T_map_robot - (0.0, 0.0, turn)
@@ -137,7 +154,7 @@ class Episode:
         A room that is new to the map confirms nothing, and may look like one that it knows.
         """
         odds, own = self._odds, self.evidence
-        best = max((odds.confirmed(place.evidence.known_m) for place in elsewhere), default=0.0)
+        best = max((odds.evidence(place.evidence) for place in elsewhere), default=0.0)
         known = max(odds.confirmed(own.known_m), best - odds.config.alike)
         return known - odds.denied(own.through_m)
 
