@@ -16,7 +16,9 @@ from scripts.integrity.counting import (
     pooled,
     stretches,
 )
+from scripts.metrics.judged import Judged
 from slam.errors import InvalidValueError
+from slam.trajectory import Trajectory
 
 HZ = 10.0
 
@@ -50,6 +52,17 @@ def test_who_heeds_the_protection_level_drives_less_and_meets_less():
     run = moments(off=[0.1, 0.6, 0.6, 0.6], trusted=[1, 1, 1, 0], level=[0.6, 0.4, 0.7, 0.2])
     assert run.protected().tolist() == [False, True, False, False]
     assert (run.protected() & run.hazardous()).tolist() == [False, True, False, False]
+
+
+def test_the_protection_level_is_three_deviations_in_the_worst_direction():
+    stamps = np.arange(3) * 10**9
+    poses = Trajectory(stamps_ns=stamps, poses=np.zeros((3, 3)))
+    c, s = math.cos(0.7), math.sin(0.7)
+    turn = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
+    P = turn @ np.diag([0.2**2, 0.1**2, 9.0]) @ turn.T
+    covariances = np.stack([np.zeros((3, 3)), P, np.diag([0.04, 0.04, 0.0])])
+    judged = Judged(estimate=poses, truth=poses, covariances=covariances)
+    assert judged.protection_levels() == pytest.approx([0.0, 0.6, 0.6])
 
 
 def test_a_wrong_place_is_one_that_is_come_to_be_trusted():

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a SLAM with one belief promises: found where carried, and nowhere else than it is."""
 
+import copy
 import math
 from collections import Counter
 from dataclasses import replace
@@ -10,6 +11,7 @@ import numpy as np
 import pytest
 
 from scripts.integrity import plane
+from scripts.integrity.kidnap import kidnapped
 from scripts.integrity.plane import StreamSpec
 from slam import se2
 from slam.frontend.observations import observe
@@ -131,12 +133,13 @@ def test_places_move_as_surely_as_match_and_odometry_together(
     told(system, going_on(still(ROOMS, (3.0, 2.5, -1.0), 1.6), last))
     followed = [(by, said) for by, said in moved if by is not said]
     assert followed
+    R = np.diag([config.match_m**2] * 2 + [math.radians(config.match_deg) ** 2])
     for by, said in followed:
         off = said.off(by.T_map_robot)
-        match_m = math.hypot(config.match_m, abs(float(off[0])))
-        assert by.step[0, 0] <= min(said.step[0, 0], match_m**2) + 1e-12
-        assert by.step[2, 2] <= said.step[2, 2] + 1e-12
-        assert np.linalg.eigvalsh(by.step).min() > 0.0
+        surest = np.linalg.inv(np.linalg.inv(said.step) + np.linalg.inv(R + np.outer(off, off)))
+        for more, less in ((said.step, by.step), (by.step, surest)):
+            assert np.linalg.eigvalsh(more - less).min() > -1e-9
+        assert by.step[2, 2] < 0.7 * said.step[2, 2]  # the copy shows the heading, too
 
 
 @pytest.mark.parametrize("kind", SLAMS)
@@ -155,6 +158,31 @@ def test_who_is_believed_again_follows_other_places_until_next_to_nothing_speaks
         if belief.certain and not before:
             assert found or belief._p_far <= least
     assert believed
+
+
+@pytest.mark.parametrize("kind", SLAMS)
+def test_who_is_carried_while_other_places_are_followed_knows_it_and_what_it_wrote_is_undone(
+    kind: type[Tracker],
+) -> None:
+    system, stream = kind(), plane.frames(StreamSpec(kind="boards10", seed=3, seconds=40.0))
+    belief, now = system._belief, iter(enumerate(stream))
+    for last, frame in now:
+        if system.update(frame.without_truth()).converged and last > 100 and not belief.certain:
+            break
+    for start in (100, 150):
+        carried, began = copy.deepcopy(system), system._loops.n_frames
+        kept, doubt = carried._belief, belief.doubt
+        for frame in kidnapped(stream[: last + 1], stream, start, 25):
+            said = carried.update(frame.without_truth())
+            if frame.stamp_ns - stream[last].stamp_ns < 0.35e9:
+                assert said.diagnostics["state"] == "lost"
+                assert kept.doubt is not doubt  # a new one, on the copy
+            moved = se2.between(np.asarray(stream[0].truth), np.asarray(frame.truth))
+            assert not said.converged or off_m(said, moved) < 0.5
+            if kept.certain:  # found
+                since = [key.written for key in carried._loops.keys if key.frame >= began]
+                assert not any(since[:-1])
+                break
 
 
 def test_the_covariance_of_a_lost_robot_covers_all_that_it_has_seen() -> None:
