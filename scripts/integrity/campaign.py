@@ -44,7 +44,7 @@ def summary(cases: Sequence[Row]) -> dict[str, Any]:
 
     hazardous     losses with at least one hazardous scan; ``most`` their share at most (95 %)
     hazardous_protected  the same, of scans whose protection level is within the alert limit
-    protected     share of such scans that are trusted
+    protected     share of the scans that are trusted, with such a level
     denied        share of the scans that are hazardous, and beyond 3 sigma of the covariance too
     moments       stretches of hazardous scans, of drives and losses; an hour, and at most (95 %)
     recover_s     of outages of drives and of losses after an event: never is infinite

@@ -34,6 +34,7 @@ from slam.tracker.standing.agreement import Agreement
 DENIED = 14.2  # squared, in variances, of three numbers: odometry allows less in 997 of 1000
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
 NEGLIGIBLE = 0.01  # times frozen_above: so unlikely, all places beyond the alert limit are dropped
+NEXT_TO_NOTHING = np.diag([1.0, 1.0, 1.0])  # 1/m^2, 1/rad^2: numerical guard
 LEAST_P = 1e-300  # probability: numerical guard
 SIGMAS = 2.0  # deviations of odometry's drift since the doubt began that are searched; set by hand
 WIDEST_M = 1.5  # m, farthest that this widens a search nearby; set by hand
@@ -121,11 +122,13 @@ class Belief:
     ) -> Judged:
         """Where the robot is; ``T_map_before``: where it was at the scan before."""
         self._since_near_s += prediction.elapsed
-        episode, self.busy = self._episode, 0.0 if self._episode is None else 1.0
+        episode = self._episode
+        in_doubt = episode is not None and self._p_off > self._config.frozen_above
+        self.busy = 1.0 if in_doubt else 0.0 if episode is None else 0.5
         before, self._latest = self._latest, observations.with_votes(None)
         if not len(observations.points_robot):
             return self._blind(cell_map, prediction)
-        if episode is not None and self._p_off > self._config.frozen_above:
+        if episode is not None and in_doubt:
             return self._go_on(episode, T_map_before, observations, prediction)
         match = near(self._match(observations, prediction, cell_map), prediction)
         self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
@@ -168,6 +171,8 @@ class Belief:
         match = unmatched(prediction.T_map_robot, matched=0.0, score=0.0)
         if episode is not None:
             episode.moved(prediction)
+            if self._p_off <= self._config.frozen_above:
+                episode.doubted_s = 0.0
             episode.match = match
             episode.places.wait(prediction)
         return Judged(
@@ -282,7 +287,7 @@ class Belief:
         if believed is None:
             match = self._followed(episode, observations, prediction)
         else:
-            match, episode.matched = believed, True
+            match, episode.matched = believed, believed.tau > 0.0
         episode.see(observations, match)
         moved = prediction
         # the old map may have pulled the match before: from there the next one jumps
@@ -290,10 +295,9 @@ class Belief:
         if episode.matched and squared(off, prediction.step) <= DENIED:
             increment = se2.between(T_map_before, T_map_robot)
             # as sure as both together: among people a few returns must turn no place
-            known = inverted(prediction.step)
-            shown = inverted(known + match.tau * match.information)  # no more than both showed
-            match_may = shown + self._agreement.own + np.multiply.outer(off, off)
-            step = inverted(known + inverted(match_may))
+            seen = inverted(match.tau * match.information + NEXT_TO_NOTHING)
+            match_may = seen + self._agreement.own + np.multiply.outer(off, off)
+            step = inverted(inverted(prediction.step) + inverted(match_may))
             moved = prediction.changed(
                 T_map_robot=T_map_robot, increment=increment, covariance=step,
                 loosened=np.zeros((3, 3)),
@@ -403,7 +407,7 @@ class Belief:
             if long or self._p_far <= NEGLIGIBLE * self._config.frozen_above:
                 self._episode = None
             return self._settled(episode.local, match, prediction)
-        episode.believed_s = 0.0
+        episode.doubt()
         if episode.elapsed_s > prediction.elapsed:
             episode.write(observations, match.T_map_robot, prediction.elapsed)
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
@@ -429,11 +433,11 @@ class Belief:
                 match=replace(place.match, slipped=True),
                 prediction=replace(prediction, covariance=wide),
                 state=State.TRACKING, writes=True,
-                cell_map=episode.local if episode.trusted else episode.cell_map,
+                cell_map=episode.latest,
             )  # fmt: skip
         return Judged(
             match=place.match, prediction=prediction, state=State.RELOCATED,
-            cell_map=episode.cell_map, restored=True,
+            cell_map=episode.cell_map, restored=episode.trusted,
             writes=writes,  # off the map nothing else is there for the next scan to go on from
         )  # fmt: skip
 

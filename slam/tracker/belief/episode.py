@@ -46,12 +46,12 @@ class Episode:
 
     evidence  of the place that motion led to; ``before``: without the latest scan
     match     of the latest scan at that place
-    broken    nats against the motion of any scan so far, at most; of them break_nats are those of
+    broken    nats against the motion of any scan in doubt, at most; of them break_nats are those of
               returns that do not go on
     matched   whether the latest scan was matched to the copy
     trusted   whether the pose was believed since it began: the copy is the map then
     doubted_s, believed_s  s since the pose was last believed, and since it last was not
-    drift     (3, 3) in the map: by how much odometry may be off, since it began
+    drift     (3, 3) in the map: by how much odometry may be off, since the pose was last believed
     """
 
     def __init__(self, cell_map: CellMap, matcher: Matcher, odds: Odds, elapsed: float) -> None:
@@ -63,6 +63,7 @@ class Episode:
         self.broken = self.break_nats = 0.0
         self.way_m = self.elapsed_s = self.doubted_s = self.believed_s = 0.0
         self.trusted = False
+        self._kept: CellMap | None = None
         self.drift: Float = np.zeros((3, 3))
         self._found = coarse(matcher.config.tracking.relocalise)
         self._carried = odds.carried(elapsed)
@@ -76,9 +77,14 @@ class Episode:
             self._local = self._copy()
         return self._local
 
+    @property
+    def latest(self) -> CellMap:
+        """The map as it was when the pose was last believed."""
+        return self.cell_map if self._kept is None else self._kept
+
     def _copy(self) -> CellMap:
         """In which it is not known by how much the map is off that becomes known."""
-        copy = self.cell_map.twin()
+        copy = self.latest.twin()
         copy.off_cm = MOST_OFF
         return copy
 
@@ -98,12 +104,15 @@ class Episode:
         self.trusted, self.doubted_s, self.drift = True, 0.0, np.zeros((3, 3))
         self.believed_s += elapsed
 
+    def doubt(self) -> None:
+        """It is not: what is written from now on may be wrong."""
+        if self.believed_s > 0.0:
+            self.believed_s, self._kept, self._local = 0.0, self._local, None
+
     def write(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:
-        """Let the copy see a scan; grown by ``MOST_NEW`` blocks in doubt, it is begun anew."""
-        grown = used(self.local.cells) - used(self.cell_map.cells)
-        if grown > MOST_NEW and not self.trusted:
+        """Let the copy see a scan; grown by ``MOST_NEW`` blocks, it is begun anew."""
+        if used(self.local.cells) > used(self.latest.cells) + MOST_NEW:
             self._local = self._copy()
-        self.local.off_cm = MOST_OFF
         rasterise(self.local, observations, T_map_robot)
         T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
         step = min(elapsed, self.local.config.map.longest_look_s)

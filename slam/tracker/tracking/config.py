@@ -17,7 +17,7 @@ class TrackingConfig(Settings):
         60.0,
         "s",
         "of doubt: from then on 90 % are enough for who has left the map, and a session "
-        "in a known map lies apart",
+        "in a known map lies apart; of belief: then no other place is followed",
     )
     relocalise: RelocaliseConfig = field(default=RelocaliseConfig())
 

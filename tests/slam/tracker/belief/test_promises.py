@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a SLAM with one belief promises: found where carried, and nowhere else than it is."""
 
-import copy
 import math
 from collections import Counter
 from dataclasses import replace
@@ -14,15 +13,17 @@ from scripts.integrity import plane
 from scripts.integrity.kidnap import kidnapped
 from scripts.integrity.plane import StreamSpec
 from slam import se2
+from slam.frames import Frame
 from slam.frontend.observations import observe
 from slam.frontend.odometry_prior import Prediction
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.tracker.belief.belief import NEGLIGIBLE
+from slam.tracker.belief.belief import NEGLIGIBLE, Judged
 from slam.tracker.belief.episode import Episode
+from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places
 from slam.tracker.belief.posterior import Odds
 from slam.tracker.cells import used
-from slam.tracker.matching.matcher import Match, Matcher
+from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.standing.agreement import Agreement
 from slam.tracker.tracker import Tracker
 from tests.slam.tracker.belief.drives import (
@@ -160,29 +161,61 @@ def test_who_is_believed_again_follows_other_places_until_next_to_nothing_speaks
     assert believed
 
 
-@pytest.mark.parametrize("kind", SLAMS)
-def test_who_is_carried_while_other_places_are_followed_knows_it_and_what_it_wrote_is_undone(
-    kind: type[Tracker],
-) -> None:
+def believed_among_others(kind: type[Tracker]) -> tuple[Tracker, list[Frame], int]:
+    """A robot that is believed and follows other places, its stream, and its latest scan."""
     system, stream = kind(), plane.frames(StreamSpec(kind="boards10", seed=3, seconds=40.0))
-    belief, now = system._belief, iter(enumerate(stream))
-    for last, frame in now:
-        if system.update(frame.without_truth()).converged and last > 100 and not belief.certain:
-            break
-    for start in (100, 150):
-        carried, began = copy.deepcopy(system), system._loops.n_frames
-        kept, doubt = carried._belief, belief.doubt
-        for frame in kidnapped(stream[: last + 1], stream, start, 25):
-            said = carried.update(frame.without_truth())
-            if frame.stamp_ns - stream[last].stamp_ns < 0.35e9:
-                assert said.diagnostics["state"] == "lost"
-                assert kept.doubt is not doubt  # a new one, on the copy
-            moved = se2.between(np.asarray(stream[0].truth), np.asarray(frame.truth))
-            assert not said.converged or off_m(said, moved) < 0.5
-            if kept.certain:  # found
-                since = [key.written for key in carried._loops.keys if key.frame >= began]
-                assert not any(since[:-1])
-                break
+    for last, frame in enumerate(stream):
+        estimate = system.update(frame.without_truth())
+        if estimate.converged and last > 100 and not system._belief.certain:
+            return system, stream, last
+    pytest.fail("it never was")
+
+
+@pytest.mark.parametrize("kind", SLAMS)
+@pytest.mark.parametrize("start", [100, 150])
+def test_who_is_carried_while_other_places_are_followed_knows_it(
+    kind: type[Tracker], start: int
+) -> None:
+    system, stream, last = believed_among_others(kind)
+    belief, doubt = system._belief, system._belief.doubt
+    for k, frame in enumerate(kidnapped(stream[: last + 1], stream, start, 25)):
+        said = system.update(frame.without_truth())
+        moved = se2.between(np.asarray(stream[0].truth), np.asarray(frame.truth))
+        assert not said.converged or off_m(said, moved) < 0.5
+        if k < 3:
+            assert said.diagnostics["state"] == "lost"
+            assert belief.doubt is not doubt  # a new one, on the copy
+
+
+@pytest.mark.parametrize("trusted", [True, False])
+def test_what_was_written_at_a_wrong_place_is_undone(
+    trusted: bool, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    """If the robot is found elsewhere after it was believed; who never was wrote nothing."""
+    system, stream, last = believed_among_others(ShuntingSlam)
+    doubt, keys = system._belief.doubt, system._loops.keys
+    assert doubt is not None
+    assert doubt.trusted
+    assert system.cell_map is doubt.local
+    for key in range(-3, 0):  # the latest were all written
+        keys[key] = replace(keys[key], written=True)
+    system._doubted_since, old = keys[-3].frame, [key.written for key in keys[:-3]]
+    doubt.trusted = trusted
+    there = Place(
+        match=unmatched(np.array([1.0, 1.0, 1.0]), matched=1.0, score=0.0), evidence=Evidence()
+    )
+
+    def found(*_: Any) -> Judged:
+        return system._belief._found(there, doubt, prediction, writes=False)
+
+    prediction = system._predict(stream[last + 1].odometry)
+    monkeypatch.setattr(system._belief, "judge", found)
+    said = system.update(stream[last + 1].without_truth())
+    assert said.diagnostics["state"] == "relocated"
+    assert system.cell_map is doubt.cell_map
+    left = [key.written for key in keys]
+    assert left[: len(old)] == old
+    assert left[len(old) : len(old) + 3] == [not trusted] * 3
 
 
 def test_the_covariance_of_a_lost_robot_covers_all_that_it_has_seen() -> None:
