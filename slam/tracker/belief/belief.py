@@ -34,7 +34,7 @@ from slam.tracker.standing.agreement import Agreement
 DENIED = 14.2  # squared, in variances, of three numbers: odometry allows less in 997 of 1000
 PAUSE_S = 1.0  # after a longer one, what stood may have been moved
 NEGLIGIBLE = 0.01  # times frozen_above: so unlikely, all places beyond the alert limit are dropped
-NEXT_TO_NOTHING = np.diag([1.0, 1.0, 1.0])  # 1/m^2, 1/rad^2: numerical guard
+LEAST_INFORMATION = np.eye(3)  # 1/m^2, 1/rad^2, of a match that shows nothing: numerical guard
 LEAST_P = 1e-300  # probability: numerical guard
 SIGMAS = 2.0  # deviations of odometry's drift since the doubt began that are searched; set by hand
 WIDEST_M = 1.5  # m, farthest that this widens a search nearby; set by hand
@@ -226,14 +226,13 @@ class Belief:
         episode.match = match
         episode.evidence.add(cell_map, observations, match.T_map_robot)
         episode.note_break(*self._broken(observations, prediction, match, gone))
-        self._search_near(episode, cell_map, observations, prediction, match)
+        self._search_near(episode, observations, prediction, match)
         self._weigh(episode)
         return episode
 
     def _search_near(
         self,
         episode: Episode,
-        cell_map: CellMap,
         observations: Observations,
         prediction: Prediction,
         match: Match,
@@ -253,8 +252,8 @@ class Belief:
         reach_m = min(SIGMAS * math.sqrt(max(episode.drift[0, 0], episode.drift[1, 1])), WIDEST_M)
         window = SearchWindow(reach_m=max(reach_m, numbers.near_m), turn_rad=numbers.near_rad)
         start = prediction.T_map_robot
-        found = self._matcher.search(cell_map, few, start, loose, window)
-        found = self._matcher.climb(cell_map, everyone, found.T_map_robot, start, loose)
+        found = self._matcher.search(episode.cell_map, few, start, loose, window)
+        found = self._matcher.climb(episode.cell_map, everyone, found.T_map_robot, start, loose)
         if is_same(found, match):
             return
         # the robot may have slipped now, or its motion led it astray some scans ago
@@ -295,7 +294,7 @@ class Belief:
         if episode.matched and squared(off, prediction.step) <= DENIED:
             increment = se2.between(T_map_before, T_map_robot)
             # as sure as both together: among people a few returns must turn no place
-            seen = inverted(match.tau * match.information + NEXT_TO_NOTHING)
+            seen = inverted(match.tau * match.information + LEAST_INFORMATION)
             match_may = seen + self._agreement.own + np.multiply.outer(off, off)
             step = inverted(inverted(prediction.step) + inverted(match_may))
             moved = prediction.changed(
@@ -307,7 +306,7 @@ class Belief:
         new = [self._told_nearby(episode, place, match) for place in new]
         episode.places.keep(new, episode.weight, self._config.hopeless)
         if self._p_off > self._config.frozen_above:
-            self._search_near(episode, episode.cell_map, observations, prediction, match)
+            self._search_near(episode, observations, prediction, match)
         episode.places.remember(everyone)
         self._weigh(episode)
         return self._decided(episode, observations, match, prediction)
