@@ -32,6 +32,7 @@ from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places, coarse, spread
 from slam.tracker.belief.posterior import Odds, probabilities
 from slam.tracker.belief.status import State
+from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
@@ -183,7 +184,7 @@ class StartSearch:
     def __init__(self, known: Tracker, past: Past) -> None:
         self._known, self._past = known, past
         numbers = known.config
-        self._belief, self._budget = numbers.belief, numbers.matching.budget
+        self._belief = numbers.belief
         self._odds = Odds(numbers.belief, numbers.carried_per_h, changed=True)
         self._prior = -numbers.belief.place - numbers.belief.outdated
         self.seen: list[tuple[Frame, Float]] = []
@@ -226,8 +227,9 @@ class StartSearch:
             twist=np.zeros(3),
             elapsed=elapsed,
         )
-        share = self._budget.lost_share
-        for place in self._places.step(observations, prediction, share, Evidence()):
+        budget = Budget(self._known.config.matching.budget)
+        self._places.follow(observations, prediction, budget, Evidence())
+        for place in self._places.explore(observations, budget):
             self._join(place, pose)
         self._ask(pose)
         return estimate, self._found()

@@ -27,6 +27,7 @@ from slam.tracker.belief.status import State, Status
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import Look
 from slam.tracker.config import TrackerConfig
+from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Match, Matcher, Usual, near, unmatched
 from slam.tracker.standing.agreement import Agreement
@@ -68,6 +69,7 @@ class Belief:
 
     p_lost  probability that the pose is wrong
     status  what may be wrong
+    budget  of the latest scan, for searches for the robot
     busy    share of the latest scan's time that searches for the robot took, roughly: 0, 1/2 or 1
     """
 
@@ -90,12 +92,16 @@ class Belief:
         self._odds = Odds(config.belief, config.carried_per_h)
         self._episode: Episode | None = None
         self.p_lost, self.status, self.busy = 0.0, Status.TRACKING, 0.0
+        self.budget = self._new_budget()
         self._p_off = 0.0  # that the robot is not where its motion led
         self._p_far = 0.0  # nor within the alert limit of it
         self._likeliest: int | None = None  # of the places that are followed, if one is
         self._since_near_s = np.inf
         self._suspect = False
         self._latest: Observations | None = None  # the scan before, if there was one
+
+    def _new_budget(self) -> Budget:
+        return Budget(self._matcher.config.matching.budget)
 
     def first(self, observations: Observations) -> State:
         """The first scan: the map begins with it."""
@@ -122,6 +128,7 @@ class Belief:
     ) -> Judged:
         """Where the robot is; ``T_map_before``: where it was at the scan before."""
         self._since_near_s += prediction.elapsed
+        self.budget = self._new_budget()
         episode = self._episode
         in_doubt = episode is not None and self._p_off > self._config.frozen_above
         self.busy = 1.0 if in_doubt else 0.0 if episode is None else 0.5
@@ -253,13 +260,14 @@ class Belief:
         window = SearchWindow(reach_m=max(reach_m, numbers.near_m), turn_rad=numbers.near_rad)
         start = prediction.T_map_robot
         found = self._matcher.search(episode.cell_map, few, start, loose, window)
+        self.budget.spend_search(found.evaluations, len(points), len(everyone.points_robot))
         found = self._matcher.climb(episode.cell_map, everyone, found.T_map_robot, start, loose)
         if is_same(found, match):
             return
         # the robot may have slipped now, or its motion led it astray some scans ago
         first = episode.elapsed_s <= prediction.elapsed  # of the episode: no scans are kept
         of = (episode.before,) if first else (episode.before, None)
-        begun = [episode.places.begun(everyone, found, before) for before in of]
+        begun = [episode.places.begun(everyone, found, self.budget, before) for before in of]
         likelier = max(begun, key=lambda place: self._odds.evidence(place.evidence))
         place = self._told_nearby(episode, likelier, match)
         episode.places.keep([place], episode.weight, self._config.hopeless)
@@ -302,18 +310,15 @@ class Belief:
                 loosened=np.zeros((3, 3)),
             )  # fmt: skip
         everyone = observations.with_votes(None)
-        new = episode.places.step(everyone, moved, self._share(), episode.evidence)
-        new = [self._told_nearby(episode, place, match) for place in new]
-        episode.places.keep(new, episode.weight, self._config.hopeless)
+        episode.places.follow(everyone, moved, self.budget, episode.evidence)
         if self._p_off > self._config.frozen_above:
             self._search_near(episode, observations, prediction, match)
+        new = episode.places.explore(everyone, self.budget)
+        new = [self._told_nearby(episode, place, match) for place in new]
+        episode.places.keep(new, episode.weight, self._config.hopeless)
         episode.places.remember(everyone)
         self._weigh(episode)
         return self._decided(episode, observations, match, prediction)
-
-    def _share(self) -> float:
-        prices = self._matcher.config.matching.budget
-        return prices.lost_share if self._p_off > 0.5 else prices.frozen_share
 
     def _followed(
         self,

@@ -76,7 +76,6 @@ class Places:
 
     followed  with evidence, in no order
     searches  of the whole map that were finished, all their places tried
-    spent_ns  work of the latest scan, counted
     """
 
     def __init__(self, cell_map: CellMap, matcher: Matcher) -> None:
@@ -84,7 +83,7 @@ class Places:
         self._config = matcher.config.tracking.relocalise
         self._prices = matcher.config.matching.budget
         self.followed: list[Place] = []
-        self.searches, self.spent_ns = 0, 0.0
+        self.searches = 0
         self._kept: list[tuple[Observations, Float]] = []  # earlier scans, and the motion since
         self._coarse: CoarseMap | None = None
         self._search: WholeSearch | None = None
@@ -98,31 +97,25 @@ class Places:
         if len(self._kept) > self._config.kept:
             self._kept = self._kept[::2]
 
-    def step(
-        self, observations: Observations, prediction: Prediction, share: float, here: Evidence
-    ) -> list[Place]:
-        """Follow all to the next scan and go on with the search; places that are new.
-
-        ``share`` of the budget of a scan is spent; ``here``: of where motion led.
-        """
+    def follow(
+        self, observations: Observations, prediction: Prediction, budget: Budget, here: Evidence
+    ) -> None:
+        """Follow all to the next scan; ``here``: of where motion led."""
         self._go_on(prediction)
-        budget = Budget(self._prices, share)
-        price = self._prices.climb_ns * max(len(observations.points_robot), 1)
-        most = max(1, int(self._prices.known_share * budget.left_ns / price))
-        turns = sorted(self.followed, key=lambda place: -place.waited)
-        matched = {id(place) for place in turns[:most]}
-        self.followed = [
-            self._matched(place, observations, prediction, here)
-            if id(place) in matched
-            else self._waiting(place, prediction)
-            for place in self.followed
-        ]
-        budget.spend(price * len(matched))
-        new = self._tried(observations, budget, price)
+        left = (1.0 - self._prices.known_share) * budget.left_ns
+        moved: dict[int, Place] = {}
+        for place in sorted(self.followed, key=lambda place: -place.waited):
+            if moved and budget.left_ns <= left:
+                moved[id(place)] = self._waiting(place, prediction)
+            else:
+                moved[id(place)] = self._matched(place, observations, prediction, here, budget)
+        self.followed = [moved[id(place)] for place in self.followed]
+
+    def explore(self, observations: Observations, budget: Budget) -> list[Place]:
+        """Go on with the search of the whole map, after ``follow``; places that are new."""
+        new = self._tried(observations, budget)
         self._look_around(observations, budget)
-        new += self._tried(observations, budget, price)
-        self.spent_ns = budget.spent_ns
-        return new
+        return new + self._tried(observations, budget)
 
     def wait(self, prediction: Prediction) -> None:
         """Carry all on by odometry."""
@@ -174,39 +167,54 @@ class Places:
                 self._search = None
                 self.searches += not self._found
 
-    def _tried(self, observations: Observations, budget: Budget, price: float) -> list[Place]:
+    def _tried(self, observations: Observations, budget: Budget) -> list[Place]:
         """Places found, carried on to this scan, as many as the budget allows."""
         new = []
         while self._found and budget.left_ns > 0.0:
             place = self._found.pop(0)
             covariance = se2.propagate(coarse(self._config), place, self._motion, self._drift)
             here = se2.compose(place, self._motion)
-            new.append(self.begun(observations, self._climb(observations, here, covariance)))
+            match = self._climb(observations, here, covariance, budget)
             few = min(len(observations.points_robot), self._matcher.numbers.climb.few)
-            points = max(len(observations.points_robot), 1)
-            weighed = self._prices.weigh_ns * points * len(self._kept)
-            budget.spend(price + weighed + few * self._prices.approach_ns)
+            budget.spend(self._prices.approach_ns * few)
+            new.append(self.begun(observations, match, budget))
             self.searches += self._search is None and not self._found
         return new
 
     def begun(
-        self, observations: Observations, match: Match, before: Evidence | None = None
+        self,
+        observations: Observations,
+        match: Match,
+        budget: Budget,
+        before: Evidence | None = None,
     ) -> Place:
         """A place with what this scan says of it, and those before it: what was said ``before``
         of where motion led, or else what kept scans say of where it came from.
         """
         evidence = Evidence() if before is None else before.copy()
         for seen, motion in self._kept if before is None else ():
-            evidence.add(self._cell_map, seen, se2.compose(match.T_map_robot, se2.inverse(motion)))
-        evidence.add(self._cell_map, observations, match.T_map_robot)
+            at = se2.compose(match.T_map_robot, se2.inverse(motion))
+            self._weigh(evidence, seen, at, budget)
+        self._weigh(evidence, observations, match.T_map_robot, budget)
         return Place(match=match, evidence=evidence)
 
+    def _weigh(
+        self, evidence: Evidence, observations: Observations, T_map_robot: Float, budget: Budget
+    ) -> None:
+        look = evidence.add(self._cell_map, observations, T_map_robot)
+        budget.spend(self._prices.weigh_ns * look.visited)
+
     def _matched(
-        self, old: Place, observations: Observations, prediction: Prediction, here: Evidence
+        self,
+        old: Place,
+        observations: Observations,
+        prediction: Prediction,
+        here: Evidence,
+        budget: Budget,
     ) -> Place:
         moved = self._waiting(old, prediction)
-        match = self._climb(observations, moved.match.T_map_robot, moved.drift)
-        old.evidence.add(self._cell_map, observations, match.T_map_robot)
+        match = self._climb(observations, moved.match.T_map_robot, moved.drift, budget)
+        self._weigh(old.evidence, observations, match.T_map_robot, budget)
         gain_m, scans = old.evidence.latest_m - here.latest_m, old.scans + 1
         seen = old.evidence.latest_m >= self._matcher.config.belief.confirmed_m
         return replace(
@@ -226,7 +234,10 @@ class Places:
         unseen_s, waited = old.unseen_s + prediction.elapsed, old.waited + 1
         return replace(old, match=match, unseen_s=unseen_s, waited=waited, drift=drift)
 
-    def _climb(self, observations: Observations, T_map_robot: Float, covariance: Float) -> Match:
+    def _climb(
+        self, observations: Observations, T_map_robot: Float, covariance: Float, budget: Budget
+    ) -> Match:
+        budget.spend(self._prices.climb_ns * max(len(observations.points_robot), 1))
         start = self._matcher.approach(self._cell_map, observations, T_map_robot, covariance)
         precision = inverted(covariance)
         return self._matcher.climb(self._cell_map, observations, start, T_map_robot, precision)

@@ -11,6 +11,7 @@ from slam.days.evidence import Snapshot
 from slam.days.history import History
 from slam.days.search import KNOWN, SPOILS, Agreement, Past, StartSearch
 from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.tracker.matching.budget import Budget
 from tests.world2d import Drive, World2D, frames, laser, rectangle, wander
 
 CONFIG = ShuntingConfig(cell_m=0.05, trace_s=2.5)
@@ -88,7 +89,7 @@ def test_a_place_that_is_found_late_is_asked_for_the_scans_before(home):
     pose = search._before[1]
     one = search._kept[-1].observations
     match = home.matched(one, se2.compose(found, pose), np.diag([0.01, 0.01, 0.001]))
-    late = search._places.begun(one, match)
+    late = search._places.begun(one, match, Budget(home.config.matching.budget))
     assert late.evidence.known_m < before
     search._places.followed.clear()
     search._join(late, pose)

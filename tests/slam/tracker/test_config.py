@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("19ec52787b6f", "8341c1c6d78e")),
-        (OccupancyConfig, ["grid"], ("b8df8356a89b", "07cae4af8f26")),
+        (ShuntingConfig, [], ("efda79997d80", "6ee236a11927")),
+        (OccupancyConfig, ["grid"], ("2bc2049fcda1", "08ac58efc39f")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
@@ -40,6 +40,7 @@ def test_a_tree_keeps_its_paths_its_order_and_its_digest(
         ("standing.long_window_s", "standing.window_s"),
         ("belief.through_per_m", "belief.through"),
         ("belief.changed_per_m", "belief.through"),
+        ("matching.budget.lost_share", "matching.budget.counted_share"),
     ],
 )
 def test_a_number_that_is_gone_is_refused_by_the_name_of_what_took_its_place(

@@ -8,12 +8,14 @@ import numpy as np
 import pytest
 
 from slam import se2
+from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, squared, turned
 from slam.tracker.belief.episode import Episode, second_moment
 from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import Place, Places
 from slam.tracker.belief.posterior import Odds
 from slam.tracker.cell_map import CellMap
+from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.matcher import Matcher, unmatched
 from tests.slam.tracker.belief.rooms import CONFIGS, KINDS, ORIGIN, known, seen
 from tests.world2d import World2D, arena
@@ -147,12 +149,20 @@ def test_a_place_is_carried_on_by_odometry_and_matched_to_the_scan() -> None:
         T_map_robot=believed, increment=truth + np.array([0.02, -0.02, 0.01]),
         covariance=np.diag([0.03**2, 0.03**2, 0.02**2]), twist=np.zeros(3), elapsed=0.2,
     )  # fmt: skip
-    places.step(seen(ROOM, truth, NETWORK), prediction, 0.5, Evidence())
+    budget = Budget(CONFIG.matching.budget, 0.5)
+    places.follow(seen(ROOM, truth, NETWORK), prediction, budget, Evidence())
     followed = places.followed[0]
     np.testing.assert_allclose(followed.match.T_map_robot, truth, atol=0.01)
     assert (followed.scans, followed.waited) == (2, 0)
     assert followed.evidence.known_m > 5.0
     assert followed.gain_m == followed.evidence.latest_m / 2.0  # the mean of its two scans
+
+
+def stepped(places: Places, view: Observations, still: Prediction, share: float) -> list[Place]:
+    """One scan with ``share`` of a budget; places that are new."""
+    budget = Budget(CONFIG.matching.budget, share)
+    places.follow(view, still, budget, Evidence())
+    return places.explore(view, budget)
 
 
 def test_the_search_of_the_whole_map_finds_the_robot_over_several_scans() -> None:
@@ -169,9 +179,9 @@ def test_the_search_of_the_whole_map_finds_the_robot_over_several_scans() -> Non
         places, steps = Places(cell_map, Matcher(CONFIG)), 0
         new: list[Place] = []
         while not new and steps < 1000:
-            new, steps = places.step(view, still, share, Evidence()), steps + 1
+            new, steps = stepped(places, view, still, share), steps + 1
         while places.searches == 0 and steps < 1000:
-            new, steps = new + places.step(view, still, share, Evidence()), steps + 1
+            new, steps = new + stepped(places, view, still, share), steps + 1
         off = min(np.abs(one.match.T_map_robot - truth).max() for one in new)
         assert off < 0.02
         took.append(steps)

@@ -116,12 +116,12 @@ def test_places_move_as_surely_as_match_and_odometry_together(
 ) -> None:
     """Else a few returns among people turn a place by what odometry alone may be off."""
     system, last = mapped(ROOMS, LONG_TURN)
-    config, plain = system.config.standing, Places.step
+    config, plain = system.config.standing, Places.follow
     moved: list[tuple[Prediction, Prediction]] = []
 
-    def step(self: Places, *arguments: Any) -> list[Place]:
+    def follow(self: Places, *arguments: Any) -> None:
         moved.append((arguments[1], odometry[-1]))
-        return plain(self, *arguments)
+        plain(self, *arguments)
 
     odometry, judge = [], system._belief.judge
 
@@ -129,7 +129,7 @@ def test_places_move_as_surely_as_match_and_odometry_together(
         odometry.append(arguments[3])
         return judge(*arguments)
 
-    monkeypatch.setattr(Places, "step", step)
+    monkeypatch.setattr(Places, "follow", follow)
     monkeypatch.setattr(system._belief, "judge", judged)
     told(system, going_on(still(ROOMS, (3.0, 2.5, -1.0), 1.6), last))
     followed = [(by, said) for by, said in moved if by is not said]
@@ -381,12 +381,11 @@ def carried(budget_ms: float) -> tuple[Counter[str], list[float], float]:
     stream = frames(ROOMS, LONG_TURN, rate_hz=5.0, seed=3)
     told(system, stream)
     said: Counter[str] = Counter()
-    spent = []
+    spent: list[float] = []
     for frame in going_on(frames(ROOMS, ELSEWHERE, rate_hz=5.0, seed=7), stream[-1]):
         estimate = system.update(frame.without_truth())
         said.update(states([estimate]))
-        episode = system._belief._episode
-        spent.append(0.0 if episode is None else episode.places.spent_ns)
+        spent.append(system._belief.budget.spent_ns - system._belief.budget.near_ns)
     assert estimate.diagnostics["state"] in ("tracking", "frozen", "lost")
     return said, spent, off_m(estimate, frame.truth)
 
@@ -400,8 +399,8 @@ def test_no_scan_of_a_lost_robot_does_more_than_its_budget_and_it_is_found(
     if said["relocated"]:
         assert error_m < 0.03
     prices = FAST.matching.budget
-    counted = max(prices.lost_share, prices.frozen_share) * budget_ms * 1e6
-    kept_ns = FAST.tracking.relocalise.kept * 361 * prices.weigh_ns
+    counted = prices.counted_share * budget_ms * 1e6
+    kept_ns = (FAST.tracking.relocalise.kept + 1) * 5000 * prices.weigh_ns  # cells in view
     match_ns = 361 * prices.climb_ns + 90 * prices.approach_ns + kept_ns
     if budget_ms == 10.0:
         assert max(spent) > 0.0  # it took more than a scan
