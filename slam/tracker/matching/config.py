@@ -91,7 +91,8 @@ class GlobalConfig(Settings):
     coarsest_rad: float = number(0.1, "rad", "largest step of heading", low=1e-3, high=0.5)
 
 
-PRICE = "measured on one core of an EPYC"
+PRICE = "measured on one core of a Xeon that others use too"
+NEWER = "measured on one core of an EPYC"
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,17 +102,17 @@ class BudgetConfig(Settings):
     budget_ms: float = number(
         20.0, "ms", "that no scan takes longer than; less: a lost robot is found later", low=1.0
     )
-    cell_ns: float = number(3.0, "ns", "to lay out one cell of the map", PRICE, low=1e-2)
-    bound_ns: float = number(0.5, "ns", "to look a point up in one coarse block", PRICE, low=1e-3)
+    cell_ns: float = number(9.0, "ns", "to lay out one cell of the map", PRICE, low=1e-2)
+    bound_ns: float = number(0.3, "ns", "to look a point up in one coarse block", PRICE, low=1e-3)
     node_ns: float = number(12.0, "ns", "to look a point up in the 64 of a node", PRICE, low=1e-2)
     order_ns: float = number(3.0, "ns", "to put a coarse block in order", PRICE, low=1e-3)
-    place_ns: float = number(15.0, "ns", "to place a point at one heading", PRICE, low=1e-2)
-    climb_ns: float = number(1500.0, "ns", "to match a point at one hypothesis", PRICE, low=1.0)
+    place_ns: float = number(10.0, "ns", "to place a point at one heading", PRICE, low=1e-2)
+    climb_ns: float = number(1500.0, "ns", "to match a point at one hypothesis", NEWER, low=1.0)
     approach_ns: float = number(
         20_000.0, "ns", "to approach a place just found, by each of climb.few points", PRICE,
         low=1.0,
     )  # fmt: skip
-    weigh_ns: float = number(100.0, "ns", "to weigh a cell that a scan sees", PRICE, low=1.0)
+    weigh_ns: float = number(100.0, "ns", "to weigh a cell that a scan sees", NEWER, low=1.0)
     known_share: float = number(
         0.5, "share", "of what is counted: most that is spent on hypotheses that are followed",
         high=1.0,

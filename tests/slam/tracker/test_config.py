@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("efda79997d80", "6ee236a11927")),
-        (OccupancyConfig, ["grid"], ("2bc2049fcda1", "08ac58efc39f")),
+        (ShuntingConfig, [], ("70210b9c8918", "9b89623899c6")),
+        (OccupancyConfig, ["grid"], ("f745f8f8d4ba", "867890f2b29d")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(
