@@ -184,7 +184,7 @@ class StartSearch:
     def __init__(self, known: Tracker, past: Past) -> None:
         self._known, self._past = known, past
         numbers = known.config
-        self._belief = numbers.belief
+        self._belief, self._budget = numbers.belief, numbers.matching.budget
         self._odds = Odds(numbers.belief, numbers.carried_per_h, changed=True)
         self._prior = -numbers.belief.place - numbers.belief.outdated
         self.seen: list[tuple[Frame, Float]] = []
@@ -227,7 +227,7 @@ class StartSearch:
             twist=np.zeros(3),
             elapsed=elapsed,
         )
-        budget = Budget(self._known.config.matching.budget)
+        budget = Budget(self._budget, self._budget.lost_share)
         self._places.follow(observations, prediction, budget, Evidence())
         for place in self._places.explore(observations, budget):
             self._join(place, pose)

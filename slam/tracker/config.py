@@ -60,8 +60,6 @@ class TrackerConfig(Settings):
         "belief.searches": "belief.searched",
         "belief.through_per_m": "belief.through",
         "belief.changed_per_m": "belief.through",
-        "matching.budget.lost_share": "matching.budget.counted_share",
-        "matching.budget.frozen_share": "matching.budget.counted_share",
     }
     constants: ClassVar[Mapping[str, str]] = {
         "frontend": "slam.frontend.observations",

@@ -42,7 +42,6 @@ _GROUPS = {
 _NUMBERS: dict[str, tuple[str, ...]] = {
     "frontend": ("spacing_m", "least_weight"),
     "belief": ("changed_per_m", "confirmed_share", "through_per_m"),
-    "matching.budget": ("frozen_share", "lost_share"),
     "standing": (
         "better", "doubtful_m", "explains", "fallen", "fallen_s", "long_window_s", "outvoted",
         "rival_gain", "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans",

@@ -38,7 +38,6 @@ from slam.tracker.config import TrackerConfig
 # share: w c (``cells.Look``) at which a cell that is seen through counts whole, a surer one more;
 # it sets the unit of D; by hand
 SURE = 0.35
-FAINT = 0.02  # trace; of what was there more seldom no place is asked: 6e-6 m a cell at most
 
 
 class Law(NamedTuple):
@@ -141,16 +140,15 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                         alive = True
                         continue
                     if given == 0.0:
-                        age = cells.age[slot, jj, ii]
-                        if once and y * age <= FAINT * (age + law.known_s):
-                            continue
                         px = (i0 + ii + 0.5) * cell - ox
                         py = (j0 + jj + 0.5) * cell - oy
                         if not seen_empty(view, c * px + s * py, c * py - s * px, free):
                             alive = True
                             continue
                         contradicted += y
-                        weight = y * age / (age + law.known_s)
+                        weight = (
+                            y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
+                        )
                         weight *= crossed(cells.facing[slot, jj, ii], px, py)
                         through += fresh(counted, once, THROUGH, slot, jj, ii, weight)
                     elif not behind:

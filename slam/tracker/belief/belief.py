@@ -69,7 +69,7 @@ class Belief:
 
     p_lost  probability that the pose is wrong
     status  what may be wrong
-    budget  of the latest scan, for searches for the robot
+    budget  of the latest scan, for searches for the robot; nothing limits that nearby, which counts
     busy    share of the latest scan's time that searches for the robot took, roughly: 0, 1/2 or 1
     """
 
@@ -92,8 +92,8 @@ class Belief:
         self._odds = Odds(config.belief, config.carried_per_h)
         self._episode: Episode | None = None
         self.p_lost, self.status, self.busy = 0.0, Status.TRACKING, 0.0
-        self.budget = self._new_budget()
         self._p_off = 0.0  # that the robot is not where its motion led
+        self.budget = self._new_budget()
         self._p_far = 0.0  # nor within the alert limit of it
         self._likeliest: int | None = None  # of the places that are followed, if one is
         self._since_near_s = np.inf
@@ -101,7 +101,9 @@ class Belief:
         self._latest: Observations | None = None  # the scan before, if there was one
 
     def _new_budget(self) -> Budget:
-        return Budget(self._matcher.config.matching.budget)
+        prices = self._matcher.config.matching.budget
+        lost = self._p_off > 0.5
+        return Budget(prices, prices.lost_share if lost else prices.frozen_share)
 
     def first(self, observations: Observations) -> State:
         """The first scan: the map begins with it."""
@@ -260,7 +262,9 @@ class Belief:
         window = SearchWindow(reach_m=max(reach_m, numbers.near_m), turn_rad=numbers.near_rad)
         start = prediction.T_map_robot
         found = self._matcher.search(episode.cell_map, few, start, loose, window)
-        self.budget.spend_search(found.evaluations, len(points), len(everyone.points_robot))
+        prices, climbed = self.budget.prices, len(points) + len(everyone.points_robot)
+        scored = found.evaluations * len(points)
+        self.budget.spend(prices.bound_ns * scored + prices.climb_ns * climbed)
         found = self._matcher.climb(episode.cell_map, everyone, found.T_map_robot, start, loose)
         if is_same(found, match):
             return

@@ -117,8 +117,9 @@ class BudgetConfig(Settings):
         0.5, "share", "of what is counted: most that is spent on hypotheses that are followed",
         high=1.0,
     )  # fmt: skip
-    counted_share: float = number(
-        0.5, "share", "of budget_ms that is counted: for finding the robot", high=1.0
+    lost_share: float = number(0.5, "share", "of budget_ms that is counted while lost", high=1.0)
+    frozen_share: float = number(
+        0.1, "share", "the same while frozen: three searches around it run", high=1.0
     )
 
 

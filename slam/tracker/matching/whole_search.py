@@ -5,6 +5,7 @@ The answers are the same, in the same order, however the work is divided.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -17,7 +18,7 @@ from slam.tracker.matching.config import GlobalConfig
 from slam.tracker.matching.local_search import place
 from slam.tracker.matching.planes import LARGE, SPAN, Queue, bound_blocks, flatten, open_nodes
 
-FIRST_ROOM = 1 << 17  # nodes of the heap at first
+FIRST_ROOM = 1 << 22  # nodes of the heap: 64 MiB, no memory until used; growing would copy all of it
 BINS = 1 << 12  # of bounds
 BATCH = 1 << 13  # blocks that are queued at a time, at least
 SORTED = 50  # times the price of a block that is passed over: one that is queued
@@ -54,6 +55,14 @@ class WholeSearch:
         self._state, self._least = planes.MORE, 0  # of the queue; blocks with more are in it
         self._counts, self._bin = np.zeros(BINS, np.int64), BINS  # blocks by bound; those queued
         self._flats: list[NDArray[np.uint64]] = []  # of each plane
+
+    def __getstate__(self) -> dict[str, Any]:
+        """A copy without room that is not used."""
+        state = vars(self).copy()
+        if self._queue is not None:
+            size = int(self._queue.counts[planes.SIZE])
+            state["_queue"] = self._queue._replace(heap=self._queue.heap[:size])
+        return state
 
     def advance(self, budget: Budget) -> list[Float]:
         """Search as far as the budget goes; the answers T_map_robot found thereby, best first."""
@@ -160,7 +169,7 @@ class WholeSearch:
             if self._state == planes.MORE and queue.counts[planes.SIZE] + planes.ROOM > len(
                 queue.heap
             ):
-                heap = np.empty((2 * len(queue.heap), 2), np.int64)
+                heap = np.empty((max(2 * len(queue.heap), FIRST_ROOM), 2), np.int64)
                 heap[: len(queue.heap)] = queue.heap  # the rest is no memory until it is used
                 self._queue = queue._replace(heap=heap)
 

@@ -89,7 +89,7 @@ def test_a_place_that_is_found_late_is_asked_for_the_scans_before(home):
     pose = search._before[1]
     one = search._kept[-1].observations
     match = home.matched(one, se2.compose(found, pose), np.diag([0.01, 0.01, 0.001]))
-    late = search._places.begun(one, match, Budget(home.config.matching.budget))
+    late = search._places.begun(one, match, Budget(home.config.matching.budget, 1.0))
     assert late.evidence.known_m < before
     search._places.followed.clear()
     search._join(late, pose)
