@@ -18,7 +18,7 @@ from slam.tracker.matching.config import GlobalConfig
 from slam.tracker.matching.local_search import place
 from slam.tracker.matching.planes import LARGE, SPAN, Queue, bound_blocks, flatten, open_nodes
 
-FIRST_ROOM = 1 << 22  # nodes of the heap: 64 MiB, no memory until used; growing would copy all of it
+FIRST_ROOM = 1 << 22  # nodes of the heap: 64 MiB, no memory until used; growing copies all of it
 BINS = 1 << 12  # of bounds
 BATCH = 1 << 13  # blocks that are queued at a time, at least
 SORTED = 50  # times the price of a block that is passed over: one that is queued
