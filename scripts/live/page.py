@@ -15,6 +15,7 @@ from typing import Any
 
 import numpy as np
 
+from scripts.live.messages import Controls
 from scripts.live.playback import (
     KEPT_S,
     Anew,
@@ -55,11 +56,13 @@ PAD = ("forward", "left", "right", "back")
 class Page:
     """The panel of one view; ``show`` is called by one thread.
 
-    gui    of viser;   inbox  where requests go
+    gui    of viser, which pages may set by ``controls``;   inbox  where requests go
     """
 
-    def __init__(self, gui: Any, scene: Any, inbox: Inbox, settings: dict[str, Any]) -> None:
-        self._gui, self._inbox = gui, inbox
+    def __init__(
+        self, gui: Any, scene: Any, controls: Controls, inbox: Inbox, settings: dict[str, Any]
+    ) -> None:
+        self._gui, self._controls, self._inbox = gui, controls, inbox
         self._said: deque[str] = deque(maxlen=MOST_SAID)
         self._series: deque[tuple[float, ...]] = deque(maxlen=1200)
         self._shown_s = self._plot_s = -math.inf
@@ -162,6 +165,7 @@ class Page:
 
     def _on(self, handle: Any, make: Callable[[Any], Request]) -> Any:
         """Ask when a page, and not we, sets a control or presses a button."""
+        self._controls.add(handle)
 
         @handle.on_click if hasattr(handle, "on_click") else handle.on_update  # type: ignore[untyped-decorator]
         def _(event: Any) -> None:
@@ -171,7 +175,10 @@ class Page:
         return handle
 
     def _key(self, label: str, key: str, make: Callable[[], Request]) -> None:
-        @self._gui.add_command(label, hotkey=key).on_trigger  # type: ignore[untyped-decorator]
+        command = self._gui.add_command(label, hotkey=key)
+        self._controls.add(command)
+
+        @command.on_trigger  # type: ignore[untyped-decorator]
         def _(_event: Any) -> None:
             self._ask(make)
 
@@ -202,6 +209,7 @@ class Page:
                 self._holding(button, v, omega)
             self._on(gui.add_button("Back on tour (T)"), lambda _: Tour())
             self._click = gui.add_dropdown("a click", (SHOVE, CARRY), initial_value=SHOVE)
+            self._controls.add(self._click)
             self._on(gui.add_button("Push what is nearest (X)"), lambda _: Push())
             self._on(gui.add_button("Open the nearest door"), lambda _: MoveDoor(opened=True))
             self._on(gui.add_button("Close the nearest door"), lambda _: MoveDoor(opened=False))
@@ -218,6 +226,8 @@ class Page:
             self._ask(lambda: Click(origin=ray[0], direction=ray[1], carry=carry))
 
     def _holding(self, button: Any, v: float, omega: float) -> None:
+        self._controls.add(button)
+
         @button.on_hold(callback_hz=HOLD_HZ)  # type: ignore[untyped-decorator]
         def _(_event: Any) -> None:
             self._ask(lambda: Drive(v=v, omega=omega))
@@ -227,6 +237,7 @@ class Page:
         known = list(dict.fromkeys([settings["slam"], *slams()]))
         with gui.add_folder("World", expand_by_default=False):
             slam = gui.add_dropdown("SLAM", known, initial_value=settings["slam"])
+            self._controls.add(slam)
             sliders: dict[str, Any] = {}
             if settings["room"]:
                 for name in ("motion", "change"):
@@ -237,6 +248,8 @@ class Page:
                 sliders["crowd"] = gui.add_dropdown(
                     "crowd", crowds, initial_value=settings["crowd"]
                 )
+                for handle in sliders.values():
+                    self._controls.add(handle)
             words = "New world, same seed" if settings["room"] else "From the start"
 
             def anew(_handle: Any) -> Request:

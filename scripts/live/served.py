@@ -11,7 +11,7 @@ import logging
 import secrets
 import sys
 import threading
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import suppress
 from dataclasses import dataclass
 from http import HTTPStatus
@@ -22,7 +22,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from scripts.live.drawn import LOG_BOUNDS, look_at
-from sim.core.checks import MOST_LETTERS
+from scripts.live.messages import Controls
 from slam.errors import InvalidValueError, MissingDependencyError
 
 log = logging.getLogger(__name__)
@@ -32,10 +32,6 @@ MOST_BYTES = 4096  # of a message of a page; where its camera is takes 300
 MOST_RATE = 120.0  # messages a second of one page; more of them wait
 HEAD_S = 5.0  # s until a handshake is there
 CARRIED = 1 << 16  # bytes that wait in the gate for a client that is slow, and a message more
-KINDS = (
-    "ViewerCameraMessage", "GuiUpdateMessage", "GuiButtonHoldMessage", "ScenePointerMessage",
-    "CommandTriggerMessage",
-)  # fmt: skip
 SECRET = "X-Mobilia-Gate"  # header of a handshake that went through the gate
 
 
@@ -125,14 +121,17 @@ class Gate:
     """Listens at an address in a thread of its own, before a server at ``behind``.
 
     page    what is given to a browser;   secret  by which the server behind knows the gate
+    admits  which messages of pages are carried;   speaks  the only version of the page let in
     port    where it listens, also where 0 was asked for
     """
 
-    def __init__(
-        self, address: tuple[str, int], behind: tuple[str, int], page: bytes, *,
+    def __init__(  # noqa: PLR0913 (each is another thing that it guards)
+        self, address: tuple[str, int], behind: tuple[str, int], page: bytes,
+        admits: Callable[[bytes], bool], *, speaks: str,
         origins: Sequence[str] = (), token: str = "", secret: str = "",
     ) -> None:  # fmt: skip
-        self._behind, self._page, self._secret = behind, page, secret
+        self._spoken: list[Any] = [speaks]
+        self._behind, self._page, self._secret, self._admits = behind, page, secret, admits
         self._loop = asyncio.new_event_loop()
         host, port = address
         try:
@@ -150,7 +149,7 @@ class Gate:
         quiet.setLevel(logging.CRITICAL)  # whoever speaks no HTTP is not worth a traceback
         return await importlib.import_module("websockets.asyncio.server").serve(
             self._carry, host, port, process_request=self._let_in, compression=None,
-            select_subprotocol=lambda _, offered: next(iter(offered), None), server_header=None,
+            subprotocols=self._spoken, server_header=None,
             open_timeout=HEAD_S, close_timeout=HEAD_S, max_size=MOST_BYTES, max_queue=2,
             write_limit=CARRIED, logger=quiet,
         )  # fmt: skip
@@ -189,16 +188,15 @@ class Gate:
         """Messages in and out until one side ends; a slow side stops the other only."""
         websockets = importlib.import_module("websockets.asyncio.client")
         closed = importlib.import_module("websockets.exceptions").WebSocketException
-        spoken = [outer.subprotocol] if outer.subprotocol else None
         with suppress(OSError, closed):
             async with websockets.connect(
-                f"ws://{self._behind[0]}:{self._behind[1]}", subprotocols=spoken, compression=None,
-                additional_headers={SECRET: self._secret}, max_size=None, max_queue=1,
-                ping_interval=None, proxy=None,
+                f"ws://{self._behind[0]}:{self._behind[1]}", subprotocols=self._spoken,
+                compression=None, additional_headers={SECRET: self._secret}, max_size=None,
+                max_queue=1, ping_interval=None, proxy=None,
             ) as inner:  # fmt: skip
                 ways = [
                     asyncio.ensure_future(way)
-                    for way in (_pass_on(outer, inner), _pour(inner, outer))
+                    for way in (_pass_on(outer, inner, self._admits), _pour(inner, outer))
                 ]
                 try:
                     await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
@@ -208,13 +206,13 @@ class Gate:
                     await asyncio.gather(*ways, return_exceptions=True)
 
 
-async def _pass_on(outer: Any, inner: Any) -> None:
+async def _pass_on(outer: Any, inner: Any, admits: Callable[[bytes], bool]) -> None:
     """Messages of a page; ends at one that no page sends."""
     async for message in outer:
         if not isinstance(message, bytes):
             log.warning("live view: a page sent what is no message of it, and is let go")
             return
-        if may_pass(message):
+        if admits(message):
             await inner.send(message)
         await asyncio.sleep(1.0 / MOST_RATE)
 
@@ -222,28 +220,6 @@ async def _pass_on(outer: Any, inner: Any) -> None:
 async def _pour(inner: Any, outer: Any) -> None:
     async for message in inner:
         await outer.send(message)
-
-
-def may_pass(message: bytes) -> bool:
-    """Whether a page's message is of a kind that a view needs; others are dropped."""
-    msgpack = importlib.import_module("msgspec.msgpack")
-    try:
-        words = msgpack.decode(message)
-    except (ValueError, RecursionError):  # msgspec's own errors are ValueErrors
-        return False
-    if not isinstance(words, dict) or words.get("type") not in KINDS:
-        return False
-    if words["type"] != "GuiUpdateMessage":
-        return True
-    updates = words.get("updates")
-    return isinstance(updates, dict) and all(
-        key == "value" and (isinstance(value, bool | float | int) or _is_word(value))
-        for key, value in updates.items()
-    )
-
-
-def _is_word(value: object) -> bool:
-    return isinstance(value, str) and len(value) <= MOST_LETTERS and value.isprintable()
 
 
 def require() -> Any:
@@ -283,6 +259,7 @@ class Served:
     """A page at an address.
 
     scene, gui  of viser: what is shown and what can be set
+    controls    of ``gui``, which pages may set
     port        where it listens, also where 0 was asked for;   behind  where viser does
     """
 
@@ -292,6 +269,7 @@ class Served:
         with contextlib.redirect_stdout(io.StringIO()):  # it prints where it listens
             self._viser = viser.ViserServer(host, port=0, label=title, verbose=False)
         self._bounds: Sequence[float] = LOG_BOUNDS
+        self.controls = Controls()
         secret = secrets.token_urlsafe(16)
         _only_from_gate(self._viser, secret)
         self.scene, self.gui = self._viser.scene, self._viser.gui
@@ -301,8 +279,8 @@ class Served:
         self.behind = behind = (host, int(self._viser.get_port()))
         try:
             self._gate = Gate(
-                address, behind, page_of(viser), origins=origins, token=new_token(address[0]),
-                secret=secret,
+                address, behind, page_of(viser), self.controls.admits, origins=origins,
+                token=new_token(address[0]), secret=secret, speaks=f"viser-v{viser.__version__}",
             )  # fmt: skip
         except InvalidValueError:
             self._stop()

@@ -20,6 +20,7 @@ from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frames import NS_PER_S
+from slam.names import NameFromFile
 
 EVENTS_NS = NS_PER_S // 5
 _SAYS = {
@@ -94,7 +95,7 @@ def _told(event: Event) -> str:
 class Opener:
     """Makes sessions, each from its start.
 
-    slams     by name, the first of them shown
+    slams     by name, the first of them shown;   typed  those that the user named, at first all
     path      of a log or a bag, None for a scene
     settings  of the scene, as ``Simulation`` takes them;   seconds  that it lives
     """
@@ -103,13 +104,16 @@ class Opener:
     path: Path | None = None
     settings: Mapping[str, Any] = field(default_factory=dict)
     seconds: float = 0.0
+    typed: Sequence[str] = ()
 
     def anew(self, request: Anew) -> "Opener":
-        """The same with what a page has asked for."""
-        slams = [request.slam or self.slams[0], *self.slams[1:]]
+        """The same with what a page has asked for, whose names are no code but those typed."""
+        typed = self.typed or tuple(self.slams)
+        first = request.slam or self.slams[0]
+        slams = [first if first in typed else NameFromFile(first, "a page"), *self.slams[1:]]
         asked = {k: getattr(request, k) for k in KNOBS if getattr(request, k) is not None}
         settings = {**self.settings, **asked} if self.path is None else self.settings
-        return replace(self, slams=list(dict.fromkeys(slams)), settings=settings)
+        return replace(self, slams=list(dict.fromkeys(slams)), settings=settings, typed=typed)
 
     def open(self) -> Session:
         """A session at its start.

@@ -130,7 +130,7 @@ class View:
         self.served = Served(address, self.session.footage.title, origins)
         settings = opener.settings
         self._page = Page(
-            self.served.gui, self.served.scene, self._inbox,
+            self.served.gui, self.served.scene, self.served.controls, self._inbox,
             {
                 "room": opener.path is None, "slam": opener.slams[0],
                 "crowd": settings.get("crowd", CROWDS[0]),

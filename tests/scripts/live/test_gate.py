@@ -7,7 +7,6 @@ import time
 from types import SimpleNamespace
 
 import pytest
-from msgspec import msgpack
 from websockets.datastructures import Headers
 from websockets.exceptions import ConnectionClosed, InvalidStatus
 from websockets.sync.client import connect
@@ -17,7 +16,7 @@ from scripts.live import served
 from scripts.live.served import Gate, Refused, Rules
 from slam.errors import InvalidValueError
 
-PORT, FLOOD = 8765, 1 << 18
+PORT, FLOOD, VERSION = 8765, 1 << 18, "viser-v1"
 RULES = Rules(host="127.0.0.1", port=PORT, origins=("https://mine.example:8443",))
 
 
@@ -84,27 +83,6 @@ def test_the_page_is_given_to_whom_the_view_is_open_and_nothing_else_is():
     assert not is_let_in(rules, host="192.168.1.2:1", upgrade=False)
 
 
-@pytest.mark.parametrize(
-    ("words", "passes"),
-    [
-        ({"type": "CommandTriggerMessage", "uuid": "x"}, True),
-        ({"type": "GuiUpdateMessage", "uuid": "x", "updates": {"value": 3.0}}, True),
-        ({"type": "GuiUpdateMessage", "uuid": "x", "updates": {"update_cb": []}}, False),
-        ({"type": "GuiUpdateMessage", "uuid": "x", "updates": {"value": [1] * 99}}, False),
-        ({"type": "GuiUpdateMessage", "uuid": "x", "updates": {"value": "x" * 999}}, False),
-        ({"type": "GuiUpdateMessage", "uuid": "x", "updates": 3}, False),
-        ({"type": "ShareUrlRequest"}, False),  # would open a tunnel to somebody's server
-        ({"type": "FileTransferStartUpload", "size_bytes": 1 << 40}, False),
-        ({"type": "RunJavascriptMessage", "source": "alert(1)"}, False),
-        ({"type": ["x"]}, False),
-        ({}, False),
-        ([], False),
-    ],
-)
-def test_messages_of_the_kinds_that_a_view_needs_pass(words, passes):
-    assert served.may_pass(msgpack.encode(words)) is passes
-
-
 @pytest.mark.parametrize("text", ["", "example.org", "https://", "https://a.example/path"])
 def test_a_wrong_origin_of_the_user_is_told(text):
     with pytest.raises(InvalidValueError, match="--allow-origin"):
@@ -124,7 +102,7 @@ def echo():
                 heard.append(FLOOD)
 
     heard = []
-    with serve(answer, "127.0.0.1", 0, compression=None) as server:
+    with serve(answer, "127.0.0.1", 0, subprotocols=[VERSION], compression=None) as server:
         threading.Thread(target=server.serve_forever, daemon=True).start()
         yield SimpleNamespace(address=server.socket.getsockname()[:2], heard=heard)
         server.shutdown()
@@ -132,13 +110,17 @@ def echo():
 
 @pytest.fixture
 def opened(echo):
-    found = Gate(("127.0.0.1", 0), echo.address, b"<html>", secret="known")
+    found = Gate(
+        ("127.0.0.1", 0), echo.address, b"<html>", lambda m: b"bad" not in m, speaks=VERSION,
+        secret="known",
+    )  # fmt: skip
     yield found
     found.close()
 
 
 def asked(opened, **options):
-    return connect(f"ws://127.0.0.1:{opened.port}", compression=None, proxy=None, **options)
+    options = {"subprotocols": [VERSION], "compression": None, "proxy": None, **options}
+    return connect(f"ws://127.0.0.1:{opened.port}", **options)
 
 
 def framed(data, first=0x82):
@@ -147,15 +129,11 @@ def framed(data, first=0x82):
     return bytes([first]) + size + bytes(4) + data
 
 
-def test_messages_are_carried_and_those_of_other_kinds_are_not(opened, echo):
-    good, bad = (
-        msgpack.encode({"type": kind, "uuid": "x" * 200})
-        for kind in ("CommandTriggerMessage", "ShareUrlRequest")
-    )
+def test_messages_that_are_admitted_are_carried_and_others_are_not(opened, echo):
     with asked(opened, additional_headers={served.SECRET: "guess"}) as client:
-        client.send(bad)
-        client.send(good)
-        assert client.recv(timeout=10.0) == good
+        client.send(b"bad")
+        client.send(b"good")
+        assert client.recv(timeout=10.0) == b"good"
     assert echo.heard == [["known"]]
 
 
@@ -202,6 +180,15 @@ def test_nothing_of_a_foreign_page_reaches_the_server(opened, echo):
     assert echo.heard == []
 
 
+@pytest.mark.parametrize("offered", [None, ["viser-v0.9"], ["x" * 2000]])
+def test_another_version_of_the_page_is_refused_before_the_server_hears_of_it(
+    opened, echo, offered
+):
+    with pytest.raises(InvalidStatus, match="400"):
+        asked(opened, subprotocols=offered)
+    assert echo.heard == []
+
+
 def test_a_hundred_clients_are_told_that_eight_are_there(opened):
     clients = [asked(opened) for _ in range(served.MOST_CLIENTS)]
     try:
@@ -215,7 +202,7 @@ def test_a_hundred_clients_are_told_that_eight_are_there(opened):
 
 def test_what_waits_for_a_client_that_does_not_read_is_bounded(opened, echo):
     with asked(opened, max_queue=1) as client:
-        client.send(msgpack.encode({"type": "CommandTriggerMessage", "uuid": "flood"}))
+        client.send(b"flood")
         sent = [-1, 0]
         while sent[-1] != sent[-2]:  # until nothing more goes in
             time.sleep(0.5)
@@ -225,4 +212,4 @@ def test_what_waits_for_a_client_that_does_not_read_is_bounded(opened, echo):
 
 def test_a_port_that_is_taken_is_told(opened, echo):
     with pytest.raises(InvalidValueError, match="cannot listen at 127"):
-        Gate(("127.0.0.1", opened.port), echo.address, b"")
+        Gate(("127.0.0.1", opened.port), echo.address, b"", bool, speaks=VERSION)

@@ -1,0 +1,190 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a page sends is data: only what it was offered is taken, all else changes nothing."""
+
+import logging
+import math
+import random
+import threading
+from types import SimpleNamespace
+
+import pytest
+import viser
+from msgspec import msgpack
+from websockets.sync.client import connect
+
+from scripts.live.messages import SILENCE_S, Controls
+from scripts.live.playback import Anew
+from scripts.live.session import Opener
+from scripts.live.view import View
+from slam.errors import UntrustedNameError
+
+OPENER = Opener(slams=["odometry"], settings={"scene": "arena", "dynamism": 0.0}, seconds=600.0)
+CAMERA = {
+    "type": "ViewerCameraMessage", "wxyz": [1.0, 0.0, 0.0, 0.0], "position": [0, 0, 9],
+    "fov": 1.2, "near": 0.01, "far": 1000.0, "image_height": 480, "image_width": 640,
+    "look_at": [0.0, 0.0, 0.0], "up_direction": [0.0, 0.0, 1.0],
+}  # fmt: skip
+CLICK = {
+    "type": "ScenePointerMessage", "event_type": "click", "ray_origin": [0.0, 0.0, 9.0],
+    "ray_direction": [0.0, 0.0, -1.0], "screen_pos": [[0.5, 0.5]], "modifier": None,
+}  # fmt: skip
+
+
+def handle(name, **said):
+    return SimpleNamespace(_impl=SimpleNamespace(uuid=name), **said)
+
+
+@pytest.fixture
+def controls():
+    found = Controls()
+    found.add(handle("button"))
+    found.add(handle("choice", options=("shunting", "ekf")))
+    found.add(handle("slider", min=0.0, max=1.0))
+    return found
+
+
+def update(uuid, value):
+    return {"type": "GuiUpdateMessage", "uuid": uuid, "updates": {"value": value}}
+
+
+GOOD = [
+    CAMERA, CLICK, update("button", True), update("choice", "ekf"), update("slider", 1),
+    {"type": "GuiButtonHoldMessage", "uuid": "button", "frequency": 4.0},
+    {"type": "CommandTriggerMessage", "uuid": "button"},
+]  # fmt: skip
+BAD = [
+    update("choice", "evil_mod:X"), update("choice", "pipe:sh"), update("choice", 1),
+    update("slider", 1.1), update("slider", math.nan), update("slider", "0.5"),
+    update("slider", True), update("button", "x"), update("button", 1.5), update("other", True),
+    update("choice", "x" * 999), update("slider", [1] * 99), update("slider", {}),
+    {"type": "GuiUpdateMessage", "uuid": "slider", "updates": {"value": 0.5, "max": 9.0}},
+    {"type": "GuiUpdateMessage", "uuid": "slider", "updates": {"update_cb": []}},
+    {"type": "GuiUpdateMessage", "uuid": "slider", "updates": 3},
+    {"type": "GuiUpdateMessage", "uuid": ["slider"], "updates": {"value": 0.5}},
+    {"type": "CommandTriggerMessage", "uuid": "other"},
+    {"type": "ShareUrlRequest"},  # would open a tunnel to somebody's server
+    {"type": "FileTransferStartUpload", "size_bytes": 1 << 40},
+    {"type": "RunJavascriptMessage", "source": "alert(1)"},
+    {**CAMERA, "image_height": 0}, {**CAMERA, "position": [0, 0]}, {**CAMERA, "fov": math.pi},
+    {**CLICK, "ray_origin": None}, {**CLICK, "event_type": "rect-select"}, {**CLICK, "more": 1},
+    {k: v for k, v in CLICK.items() if k != "screen_pos"},
+    {"type": ["x"]}, {}, [], None,
+]  # fmt: skip
+
+
+@pytest.mark.parametrize("words", GOOD)
+def test_what_was_offered_is_taken(controls, words):
+    assert controls.admits(msgpack.encode(words))
+    assert controls.left_out == 0
+
+
+@pytest.mark.parametrize("words", BAD)
+def test_anything_else_is_left_out_and_counted(controls, words):
+    assert not controls.admits(msgpack.encode(words))
+    assert controls.left_out == 1
+
+
+ODD = (math.nan, math.inf, -math.inf, 1e30, None, "x", "pipe:sh", [], {}, -1, 2**63, b"x", [[[1]]])
+
+
+def mutated(rng):
+    """A message as pages send it, of which one value is another, gone, or more."""
+    words = msgpack.decode(msgpack.encode(rng.choice(GOOD)))
+    at = words
+    key = rng.choice([*words, "more"])
+    while isinstance(at.get(key) if isinstance(at, dict) else at[key], dict | list):
+        at = at[key]
+        if not at:
+            break
+        key = rng.choice(list(at) if isinstance(at, dict) else range(len(at)))
+    if isinstance(at, dict) and rng.random() < 0.2 and key in at:
+        del at[key]
+    else:
+        at[key] = rng.choice(ODD)
+    return words
+
+
+def test_a_thousand_mutated_messages_raise_nothing_and_pass_no_odd_value(controls):
+    rng = random.Random(0)
+    for _ in range(1000):
+        words = mutated(rng)
+        data = msgpack.encode(words)
+        if rng.random() < 0.3:  # bytes cut or flipped
+            where = rng.randrange(len(data))
+            data = (
+                data[:where]
+                + (bytes([data[where] ^ 0xFF]) + data[where + 1 :])[: rng.choice((0, 99))]
+            )
+        if controls.admits(data):
+            words = msgpack.decode(data)
+            assert words["type"] in {each["type"] for each in GOOD}
+            if "updates" in words:
+                assert words["updates"]["value"] in (True, False, "shunting", "ekf") or (
+                    0.0 <= words["updates"]["value"] <= 1.0
+                )
+
+
+def test_what_was_left_out_is_told_once_a_minute(caplog):
+    now = [100.0]
+    controls = Controls(lambda: now[0])
+    with caplog.at_level(logging.WARNING):
+        for now[0] in (100.0, 101.0, 100.0 + 0.99 * SILENCE_S, 100.0 + SILENCE_S):
+            controls.admits(b"rubbish")
+    assert [record.getMessage().split()[2] for record in caplog.records] == ["1", "4"]
+
+
+def test_a_name_of_a_page_is_no_code_unless_the_user_typed_it():
+    opener = Opener(slams=["my_package:MySlam"], settings={"scene": "arena"}, seconds=9.0)
+    again = opener.anew(Anew(slam="occupancy")).anew(Anew(slam="my_package:MySlam"))
+    assert again.slams == ["my_package:MySlam"]
+    for name in ("evil_mod:X", "pipe:touch pwned", "ros2:touch pwned"):
+        with pytest.raises(UntrustedNameError, match="a page names code"):
+            opener.anew(Anew(slam=name)).open()
+
+
+def test_a_client_that_sets_what_is_not_offered_changes_nothing(tmp_path, monkeypatch, capfd):
+    """The page of the attack: a value that no dropdown offers, then the button that uses it."""
+    monkeypatch.chdir(tmp_path)
+    view = View(OPENER, ("127.0.0.1", 0), playing=False)
+    over = threading.Event()
+
+    def turn():
+        while not over.is_set():
+            view.turn()
+
+    thread = threading.Thread(target=turn)
+    thread.start()
+    handles = view.served.gui._gui_input_handle_from_uuid
+    choices = [h for h in handles.values() if hasattr(h, "options")]
+    sets = [h for h in handles.values() if hasattr(h, "options") or hasattr(h, "min")]
+    before = [h.value for h in sets]
+    try:
+        with connect(
+            f"ws://127.0.0.1:{view.served.port}", subprotocols=[f"viser-v{viser.__version__}"],
+            compression=None, proxy=None, max_size=None,
+        ) as client:  # fmt: skip
+            client.send(msgpack.encode(CAMERA))  # from now on it counts as there
+            for choice in choices:
+                for value in ("evil_mod:X", "pipe:touch pwned", "ros2:touch pwned", "escorts:9"):
+                    client.send(msgpack.encode(update(choice._impl.uuid, value)))
+            for words in BAD:
+                client.send(msgpack.encode(words))
+            anew = next(
+                h for h in handles.values() if h._impl.props.label == "New world, same seed"
+            )
+            first = view.session
+            client.send(msgpack.encode(update(anew._impl.uuid, True)))
+            for _ in range(600):
+                if view.session is not first:
+                    break
+                over.wait(0.1)
+        assert view.session is not first  # the button works, by what was set before
+        assert view.session.moments.primary == "odometry"
+        assert [h.value for h in sets] == before
+        assert view.served.controls.left_out == 4 * len(choices) + len(BAD)
+    finally:
+        over.set()
+        thread.join()
+        view.close()
+    assert not list(tmp_path.iterdir())
+    assert "Traceback" not in "".join(capfd.readouterr())
