@@ -53,6 +53,7 @@ class Track:
     durations_s: list[float] = field(default_factory=list)
     _finished: int = 0  # estimates of which ``estimates_at_end`` was asked
     _failed: bool = False  # a program over files; it is not asked again
+    _forgotten: int = 0  # scans whose estimates are not kept
 
     def online(self) -> Trajectory:
         """The poses as they were reported at the time; of a program over files, its own.
@@ -159,11 +160,17 @@ class Track:
         """One update, timed; raises ``SlamFailedError`` when the system does."""
         clock = getattr(self.system, "processor_s", time.process_time)
         start = clock()
-        with self._named(f"scan {len(self.estimates)},"), self._none_if_it_fails():
+        number = self._forgotten + len(self.estimates)
+        with self._named(f"scan {number},"), self._none_if_it_fails():
             estimate = asked(self.system, frame)
         self.durations_s.append(clock() - start)
         self.estimates.append(estimate)
         return estimate
+
+    def forget(self, kept: int) -> None:
+        """Keep the last estimates only."""
+        self._forgotten += max(len(self.estimates) - kept, 0)
+        del self.estimates[:-kept], self.durations_s[:-kept]
 
     def survive(self, frames: Iterable[Frame]) -> SlamFailedError | None:
         """Take every frame, stripped of truth; what ended it, None when it came through.
@@ -210,6 +217,12 @@ class Replay:
                 self._stamps.append(frame.stamp_ns)
                 self._poses.append(frame.truth)
             yield frame
+
+    def forget(self, kept: int) -> None:
+        """Keep the last estimates and true poses only: of a run that has no end."""
+        for track in self.tracks.values():
+            track.forget(kept)
+        del self._stamps[:-kept], self._poses[:-kept]
 
     def truth(self) -> Trajectory | None:
         """The true poses seen so far, in the world frame."""

@@ -70,16 +70,30 @@ class _Key(_Message, frozen=True, tag="CommandTriggerMessage"):
 _DECODER = msgspec.msgpack.Decoder(_Camera | _Click | _Update | _Hold | _Key)
 
 
+class Seldom:
+    """Counts what pages should not do, and tells it, a line in ``SILENCE_S`` at most."""
+
+    def __init__(self, what: str, clock: Callable[[], float] = time.monotonic) -> None:
+        self.count = 0
+        self._what, self._clock, self._said_s = what, clock, -math.inf
+
+    def note(self, why: object = "") -> None:
+        """Once more."""
+        self.count += 1
+        if self._clock() - self._said_s >= SILENCE_S:
+            self._said_s = self._clock()
+            log.warning("live view: %s, %d so far%s", self._what, self.count, why and f": {why}")
+
+
 class Controls:
     """What pages were given, and what each of it takes.
 
-    left_out  messages that were none of these
+    left_out  counts messages that were none of these
     """
 
-    def __init__(self, clock: Callable[[], float] = time.monotonic) -> None:
-        self.left_out = 0
+    def __init__(self) -> None:
+        self.left_out = Seldom("messages of pages for no control of theirs")
         self._takes: dict[str, Any] = {}
-        self._clock, self._said_s = clock, -math.inf
 
     def add(self, handle: Any) -> None:
         """A control of viser's, or a command."""
@@ -99,12 +113,6 @@ class Controls:
             elif isinstance(words, _Hold | _Key):
                 self._takes[words.uuid]
         except (ValueError, RecursionError, KeyError):  # msgspec's own errors are ValueErrors
-            self._leave_out()
+            self.left_out.note()
             return False
         return True
-
-    def _leave_out(self) -> None:
-        self.left_out += 1
-        if self._clock() - self._said_s >= SILENCE_S:
-            self._said_s = self._clock()
-            log.warning("live view: %d messages were for no control of the page", self.left_out)

@@ -22,7 +22,7 @@ from urllib.parse import urlsplit
 import numpy as np
 
 from scripts.live.drawn import LOG_BOUNDS, look_at
-from scripts.live.messages import Controls
+from scripts.live.messages import Controls, Seldom
 from slam.errors import InvalidValueError, MissingDependencyError
 
 log = logging.getLogger(__name__)
@@ -131,6 +131,7 @@ class Gate:
         origins: Sequence[str] = (), token: str = "", secret: str = "",
     ) -> None:  # fmt: skip
         self._spoken: list[Any] = [speaks]
+        self._refused = Seldom("connections were refused")
         self._behind, self._page, self._secret, self._admits = behind, page, secret, admits
         self._loop = asyncio.new_event_loop()
         host, port = address
@@ -175,7 +176,7 @@ class Gate:
             if not self.rules.check(request.path, request.headers):
                 return None
         except Refused as error:
-            log.warning("live view: refused: %s", error)
+            self._refused.note(error)
             return connection.respond(error.status, "")
         answer = connection.respond(HTTPStatus.OK, "")
         del answer.headers["Content-Length"], answer.headers["Content-Type"]
@@ -196,7 +197,7 @@ class Gate:
             ) as inner:  # fmt: skip
                 ways = [
                     asyncio.ensure_future(way)
-                    for way in (_pass_on(outer, inner, self._admits), _pour(inner, outer))
+                    for way in (self._pass_on(outer, inner), _pour(inner, outer))
                 ]
                 try:
                     await asyncio.wait(ways, return_when=asyncio.FIRST_COMPLETED)
@@ -205,16 +206,15 @@ class Gate:
                         way.cancel()
                     await asyncio.gather(*ways, return_exceptions=True)
 
-
-async def _pass_on(outer: Any, inner: Any, admits: Callable[[bytes], bool]) -> None:
-    """Messages of a page; ends at one that no page sends."""
-    async for message in outer:
-        if not isinstance(message, bytes):
-            log.warning("live view: a page sent what is no message of it, and is let go")
-            return
-        if admits(message):
-            await inner.send(message)
-        await asyncio.sleep(1.0 / MOST_RATE)
+    async def _pass_on(self, outer: Any, inner: Any) -> None:
+        """Messages of a page; ends at one that no page sends."""
+        async for message in outer:
+            if not isinstance(message, bytes):
+                self._refused.note("a page sent text")
+                return
+            if self._admits(message):
+                await inner.send(message)
+            await asyncio.sleep(1.0 / MOST_RATE)
 
 
 async def _pour(inner: Any, outer: Any) -> None:

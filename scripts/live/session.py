@@ -27,6 +27,7 @@ _SAYS = {
     "door": "moves", "person": "comes near the robot", "change": "stands elsewhere, unseen",
 }  # fmt: skip
 HOLD_NS = NS_PER_S  # a twist holds so long, then the robot stands: its sender may be gone
+KEPT = 2  # estimates of a SLAM: a stream without odometry goes on as the last two
 REACH_M = 1.0  # of a click: what is farther from it was not meant
 
 
@@ -60,7 +61,9 @@ class Session:
         for frame in self.moments.replay.run(self.footage.stream):
             said = self._said(frame.stamp_ns)
             self.moments.look(self.every * MAP_S, self.every * BIG_MAP_S)
-            yield self.moments.note(frame, self.footage.stage.placed, said)
+            shown = self.moments.note(frame, self.footage.stage.placed, said)
+            self.moments.replay.forget(KEPT)
+            yield shown
 
     def _said(self, stamp_ns: int) -> list[str]:
         said: list[str] = []

@@ -12,7 +12,7 @@ import viser
 from msgspec import msgpack
 from websockets.sync.client import connect
 
-from scripts.live.messages import SILENCE_S, Controls
+from scripts.live.messages import SILENCE_S, Controls, Seldom
 from scripts.live.playback import Anew
 from scripts.live.session import Opener
 from scripts.live.view import View
@@ -75,13 +75,13 @@ BAD = [
 @pytest.mark.parametrize("words", GOOD)
 def test_what_was_offered_is_taken(controls, words):
     assert controls.admits(msgpack.encode(words))
-    assert controls.left_out == 0
+    assert controls.left_out.count == 0
 
 
 @pytest.mark.parametrize("words", BAD)
 def test_anything_else_is_left_out_and_counted(controls, words):
     assert not controls.admits(msgpack.encode(words))
-    assert controls.left_out == 1
+    assert controls.left_out.count == 1
 
 
 ODD = (math.nan, math.inf, -math.inf, 1e30, None, "x", "pipe:sh", [], {}, -1, 2**63, b"x", [[[1]]])
@@ -126,11 +126,12 @@ def test_a_thousand_mutated_messages_raise_nothing_and_pass_no_odd_value(control
 
 def test_what_was_left_out_is_told_once_a_minute(caplog):
     now = [100.0]
-    controls = Controls(lambda: now[0])
+    seldom = Seldom("rubbish", lambda: now[0])
     with caplog.at_level(logging.WARNING):
         for now[0] in (100.0, 101.0, 100.0 + 0.99 * SILENCE_S, 100.0 + SILENCE_S):
-            controls.admits(b"rubbish")
-    assert [record.getMessage().split()[2] for record in caplog.records] == ["1", "4"]
+            seldom.note()
+    told = [record.getMessage() for record in caplog.records]
+    assert told == [f"live view: rubbish, {n} so far" for n in (1, 4)]
 
 
 def test_a_name_of_a_page_is_no_code_unless_the_user_typed_it():
@@ -181,7 +182,7 @@ def test_a_client_that_sets_what_is_not_offered_changes_nothing(tmp_path, monkey
         assert view.session is not first  # the button works, by what was set before
         assert view.session.moments.primary == "odometry"
         assert [h.value for h in sets] == before
-        assert view.served.controls.left_out == 4 * len(choices) + len(BAD)
+        assert view.served.controls.left_out.count == 4 * len(choices) + len(BAD)
     finally:
         over.set()
         thread.join()

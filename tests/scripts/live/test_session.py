@@ -9,7 +9,7 @@ import numpy as np
 import pytest
 
 from scripts.live.playback import Anew, Click, Drive
-from scripts.live.session import Hands, Opener
+from scripts.live.session import KEPT, Hands, Opener
 from sim.moments import toured
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
@@ -102,6 +102,17 @@ def test_a_page_asks_for_another_world_and_keeps_the_seed():
     assert again.slams == ["odometry", "grid"]
     assert again.settings == SETTINGS | {"seed": 4, "motion": 1.0, "crowd": "none"}
     assert replace(opener.anew(Anew()), typed=()) == opener
+
+
+def test_what_is_kept_of_a_run_does_not_grow_with_it():
+    settings = {"scene": "arena", "dynamism": 0.5}
+    session = Opener(slams=["odometry"], settings=settings, seconds=4.0).open()
+    shown = list(session.run())
+    track = session.moments.replay.tracks["odometry"]
+    assert len(shown) > 100
+    assert len(track.estimates) == len(track.durations_s) == KEPT
+    assert len(session.moments.replay.truth()) == KEPT
+    assert track.estimates[-1] is shown[-1].estimates["odometry"]
 
 
 def test_every_part_of_a_room_is_where_mujoco_has_it_and_a_ray_finds_it():
