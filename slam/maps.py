@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slam import inputs
 from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Raster
@@ -240,6 +241,7 @@ def _read_image(
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
     """Gray values, and which pixels are opaque where the image says so."""
     data = bytes_of(path, MAX_PIXELS + _MAX_HEADER_BYTES)
+    inputs.note(path)
     if image_sum is not None and _sha256(data) != image_sum:
         raise LogFormatError(path, f"is not the image that was written{_EDITED}")
     if data.startswith(b"\x89PNG"):

@@ -118,9 +118,6 @@ def _beside(path: Path) -> Path:
 
 def damage_beside(path: Path) -> str:
     """What is wrong with a file by the hash beside it; "" where all is well."""
-    for file in (path, _beside(path)):
-        if file.is_symlink():
-            return f"{file} is a link"
     if not _beside(path).exists():
         return f"{path} has no hash beside it: no {_beside(path).name}"
     try:

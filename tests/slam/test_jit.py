@@ -167,7 +167,8 @@ def test_a_damaged_entry_of_the_cache_is_made_again(tmp_path, seed):
 def test_a_cache_that_cannot_be_written_any_more_is_done_without(tmp_path):
     """Its disk is full, or somebody made something else of its files."""
     script = DAMAGED.partition("# --")[0] + (
-        "called()\nfor file in files():\n    file.unlink()\n    (file / 'full').mkdir(parents=True)\n"
+        "called()\n"
+        "for file in files():\n    file.unlink()\n    (file / 'full').mkdir(parents=True)\n"
         "assert sum(called().cache_misses.values()) == 1\nprint('done')"
     )
     (tmp_path / "full.py").write_text(script)

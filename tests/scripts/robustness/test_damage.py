@@ -13,9 +13,10 @@ import typer
 
 from scripts import results
 from scripts.film.footage import open_run
-from scripts.output import locked_folder, together, whole_folder, write_recipe
+from scripts.output import locked_folder, together, write_recipe
 from scripts.report.page import REPORT
 from scripts.verbs.verify import verify
+from scripts.whole_folder import whole_folder
 from sim.recording.dataset import Plan, read_plan, writing
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe
@@ -274,7 +275,7 @@ def test_a_flipped_recording_and_a_torn_entry_are_made_again(comparison, tmp_pat
 
 def test_a_folder_that_grows_is_vouched_for_when_its_tables_are_in_place(tmp_path):
     out = tmp_path / "out"
-    with locked_folder(out):
+    with locked_folder(out, "compare"):
         write_recipe(out, "compare", {})
         assert "incomplete" in verdicts(out)
         (out / "kept.npz").write_bytes(b"a job's result")
@@ -282,7 +283,7 @@ def test_a_folder_that_grows_is_vouched_for_when_its_tables_are_in_place(tmp_pat
             write_recipe(staged, "compare", {"more": 1})
     assert set(read_sums(out)) == {RECIPE, "kept.npz"}
     before = (out / SUMS).read_bytes()
-    with pytest.raises(TypeError), locked_folder(out), together(out) as staged:
+    with pytest.raises(TypeError), locked_folder(out, "compare"), together(out) as staged:
         write_recipe(staged, "compare", {"more": object()})
     assert (out / SUMS).read_bytes() == before  # and all that it lists is as it was
     assert check_vouched(out / RECIPE) is None
