@@ -39,6 +39,8 @@ MAX_PNG_PIXELS = 178_956_970  # what Pillow unpacks, four bytes each
 _MAX_YAML_BYTES = 1 << 16
 _EDITED = ": the sum differs (after a change on purpose, delete the two lines of sums in the YAML)"
 _IMAGE_SUM, _FIELDS_SUM = "sha256 of the image:", "sha256 of the lines below:"
+_SUMS = re.compile(rf"# {_IMAGE_SUM} ([0-9a-f]{{64}})\n# {_FIELDS_SUM} ([0-9a-f]{{64}})\n")
+_OF_SUMS = re.compile(rf"{_IMAGE_SUM}|{_FIELDS_SUM}|\b[0-9a-f]{{64}}\b")  # what is left of damaged
 
 
 def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
@@ -223,13 +225,14 @@ def has_sums(yaml: Path) -> bool:
 
 def _checked_sums(yaml: Path, text: str) -> str | None:
     """The image's sum that ``write_map`` noted, None where there is none; checks the fields'."""
-    first, _, rest = text.partition("\n")
-    second, _, fields = rest.partition("\n")
-    if not first.startswith(f"# {_IMAGE_SUM} ") or not second.startswith(f"# {_FIELDS_SUM} "):
+    found = _SUMS.match(text)
+    if found is None:
+        if _OF_SUMS.search(text):
+            raise LogFormatError(yaml, f"its sums are not those that were written{_EDITED}")
         return None
-    if second.split()[-1] != _sha256(fields.encode()):
+    if found[2] != _sha256(text[found.end() :].encode()):
         raise LogFormatError(yaml, f"its fields are not those that were written{_EDITED}")
-    return first.split()[-1]
+    return found[1]
 
 
 def _sha256(data: bytes) -> str:

@@ -313,6 +313,33 @@ def test_a_file_that_is_vouched_for_is_read_only_as_it_was(tmp_path):
     check_vouched(recipe)
 
 
+def test_a_damaged_list_does_not_let_a_changed_file_pass(tmp_path):
+    """A line with another name is of no file, and its own file has no line: that is no leave."""
+    with whole_folder(tmp_path / "run", overwrite=False) as part:
+        for name in ("a.csv", "recipf.txt", "z.npz"):
+            (part / name).write_text(name)
+        write_recipe(part, "run", {"seed": 0})
+    recipe, sums = tmp_path / "run" / RECIPE, tmp_path / "run" / SUMS
+    recipe.write_text(recipe.read_text().replace("0", "1"))
+    rng, whole = np.random.default_rng(7), sums.read_bytes()
+    line = whole.index(b"recipe.json") - 66
+    for k in range(300):
+        data = bytearray(whole)
+        at = int(rng.integers(line, line + 78)) if k % 2 else int(rng.integers(len(data)))
+        data[at] ^= 1 << int(rng.integers(8))
+        if k % 3 == 0:
+            del data[at]
+        sums.write_bytes(data)
+        with pytest.raises(LogFormatError, match=r"damaged|no hash|not a text"):
+            check_vouched(recipe)
+    sums.write_bytes(whole.replace(b"recipe.json", b"recipe.jsoo"))
+    with pytest.raises(LogFormatError, match=r"lists recipe.jsoo, which is not there, and not rec"):
+        check_vouched(recipe)
+    sums.write_bytes(whole)
+    (tmp_path / "run" / "mine.txt").write_text("mine")
+    check_vouched(tmp_path / "run" / "mine.txt")  # nobody lists it, and nothing is lost
+
+
 def test_one_episode_is_checked_and_made_again_by_any_name(copied, monkeypatch, capsys):
     (copied / EPISODES[0]).rename(copied / "mine")
     monkeypatch.chdir(copied / "mine")
