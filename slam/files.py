@@ -76,7 +76,11 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """``path.write_text`` in UTF-8 that appears whole or not at all."""
-    write_bytes(path, text.encode("utf-8"))
+    try:
+        data = text.encode("utf-8")
+    except UnicodeEncodeError as error:
+        raise OutputError(f"cannot write {path}: it would hold a name that is no UTF-8") from error
+    write_bytes(path, data)
 
 
 def part_of(path: Path) -> Path:
