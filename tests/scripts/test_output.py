@@ -12,9 +12,11 @@ from scripts.comparison import folder as compared
 from scripts.comparison.again import run_of
 from scripts.names import run_name
 from scripts.output import (
+    READY,
     check_whole,
     locked_folder,
     put_tables,
+    result_folder,
     together,
     write_recipe,
 )
@@ -269,6 +271,34 @@ def test_tables_stopped_on_the_way_are_refused_and_then_finished(tmp_path: Path,
     put_tables(tmp_path)
     check_whole(tmp_path)
     assert contents(tmp_path) == {"a.csv": "new", "runs/b.csv": "new"}
+
+
+@pytest.mark.parametrize("moved", range(4))
+def test_the_same_command_goes_on_wherever_its_tables_were_stopped(
+    tmp_path: Path, monkeypatch, moved: int
+):
+    def grown(text: str) -> None:
+        out = result_folder(tmp_path / "out", "compare", {"text": text})
+        with out as tables, tables() as staged:
+            for name in ("a.csv", "runs/b.csv"):
+                write_text(staged / name, text)
+
+    def cut(one, two):
+        if Path(one).is_relative_to(tmp_path / "out" / READY):
+            done.append(one)
+            if len(done) > moved:
+                raise KeyboardInterrupt
+        replace(one, two)
+
+    done, replace = list[Path](), os.replace
+    grown("old")
+    monkeypatch.setattr("os.replace", cut)
+    with pytest.raises(KeyboardInterrupt):
+        grown("new")
+    monkeypatch.undo()
+    grown("new")
+    assert set(contents(tmp_path / "out")) == {"a.csv", "runs/b.csv", "recipe.json"}
+    assert contents(tmp_path / "out")["a.csv"] == "new"
 
 
 @pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()])
