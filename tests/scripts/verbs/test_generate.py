@@ -355,8 +355,8 @@ def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_pat
 @pytest.mark.parametrize("verb", ["generate", "compare"])
 def test_a_scheduler_of_dask_that_dies_is_one_line_and_the_command_goes_on(tmp_path, verb):
     words = {
-        "generate": "generate arena --seconds 5 --episodes 6",
-        "compare": "compare --slam odometry --scene arena --dynamism 0.5 --seeds 6 --seconds 5",
+        "generate": "generate arena --seconds 20 --episodes 6",
+        "compare": "compare --slam odometry --scene arena --dynamism 0.5 --seeds 6 --seconds 20",
     }[verb]
     command = [sys.executable, "-m", "scripts", *words.split(), "--out", str(tmp_path / "out")]
     with dask_cluster(tmp_path) as (address, parts):
@@ -364,7 +364,7 @@ def test_a_scheduler_of_dask_that_dies_is_one_line_and_the_command_goes_on(tmp_p
             [*command, "--cluster", address], cwd=REPO, env=environment(), text=True,
             stdout=subprocess.PIPE, stderr=subprocess.PIPE,
         )  # fmt: skip
-        wait_for(lambda: list((tmp_path / "out").glob("**/*.part*")))
+        wait_for(lambda: list((tmp_path / "out").glob(f"**/.*.{parts[1].pid}.part*")))
         parts[0].kill()
         printed, said = begun.communicate(timeout=60)
         assert begun.returncode == 1
