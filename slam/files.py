@@ -77,10 +77,9 @@ def write_bytes(path: Path, data: bytes) -> None:
 def write_text(path: Path, text: str) -> None:
     """``path.write_text`` in UTF-8 that appears whole or not at all."""
     try:
-        data = text.encode("utf-8")
+        write_bytes(path, text.encode("utf-8"))
     except UnicodeEncodeError as error:
         raise OutputError(f"cannot write {path}: it would hold a name that is no UTF-8") from error
-    write_bytes(path, data)
 
 
 def part_of(path: Path) -> Path:
@@ -171,7 +170,7 @@ def refuse_links(*paths: Path) -> None:
             if stat.S_ISDIR(mode):
                 waiting += path.iterdir()
             elif not stat.S_ISREG(mode):
-                what = "a link" if stat.S_ISLNK(mode) else "neither a file nor a folder"
+                what = "a link" if stat.S_ISLNK(mode) else "no file"
                 raise OutputError(f"{path} is {what}, in a folder that is written: move it away")
 
 
