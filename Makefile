@@ -49,7 +49,7 @@ wheel: $(STAMP)  ## build dist/*.whl, try it in an empty virtual environment, pr
 
 # Extras stay in the names: pip, with hashes, takes "coverage[toml]" for another package than "coverage".
 lock: $(STAMP)   ## resolve the locks anew (versions and hashes, Python 3.11 to 3.14, no index address)
-	@$(BIN)/python -m pip install --quiet uv
+	@$(PIP) --require-hashes -r requirements-ci.lock  # uv
 	@$(BIN)/uv pip compile --universal --python-version 3.11 --group dev --generate-hashes --no-strip-extras \
 	  --no-header --no-annotate --upgrade --quiet pyproject.toml -o requirements.lock
 	@cp requirements.lock requirements-run.lock  # the same versions, of what running needs
@@ -57,6 +57,8 @@ lock: $(STAMP)   ## resolve the locks anew (versions and hashes, Python 3.11 to 
 	  --no-header --no-annotate --quiet pyproject.toml -o requirements-run.lock
 	@$(BIN)/uv pip compile --universal --python-version 3.11 --group docs --generate-hashes --no-strip-extras \
 	  --no-header --no-annotate --upgrade --quiet -o requirements-docs.lock
+	@$(BIN)/uv pip compile --universal --python-version 3.11 --group ci -c requirements.lock --generate-hashes --no-strip-extras \
+	  --no-header --no-annotate --upgrade --quiet -o requirements-ci.lock
 
 clean:           ## remove the virtual environment, caches and outputs
 	@rm -rf $(VENV) $(DOCS) out build dist .mypy_cache .ruff_cache .pytest_cache .hypothesis

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """The console command's first breath: Ctrl-C is understood before the slow imports begin."""
 
+import io
 import os
 import sys
 
@@ -10,6 +11,9 @@ from scripts import interrupt
 def main() -> None:
     """Install the signal handlers, then load and run the command line."""
     interrupt.install()
+    for stream in (sys.stdout, sys.stderr):
+        if isinstance(stream, io.TextIOWrapper):
+            stream.reconfigure(errors="backslashreplace")  # of ASCII, say: \u2713 for a tick
     try:
         leave_out()
         from sim.view import gl

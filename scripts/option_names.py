@@ -4,10 +4,12 @@
 import re
 from collections.abc import Mapping, Sequence
 from importlib import import_module
+from pathlib import Path
 from typing import Any
 
 from typer.core import TyperCommand
 
+from slam import inputs
 from slam.errors import InvalidValueError
 
 WORDS = "mobilia.words"  # of the command line, in a context
@@ -44,9 +46,13 @@ COMPLETED: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
+WRITTEN = ("out", "strip_to", "replay", "page", "map_out", "seal")  # options that say where to
+
+
 class Verb(TyperCommand):
     """A command whose list options take all the words up to the next option, whose names a shell
-    completes, whose errors name its options, and whose help fits any terminal."""
+    completes, whose errors name its options, whose help fits any terminal, and which never writes
+    over what it is given to read."""
 
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
@@ -75,14 +81,32 @@ class Verb(TyperCommand):
         return super().shell_complete(ctx, incomplete)
 
     def invoke(self, ctx: Any) -> Any:
-        """Run it; ``InvalidValueError`` about a field becomes one about the option."""
+        """Run it; ``InvalidValueError`` about a field becomes one about the option.
+
+        Raises ``OutputError`` where it is to write to what it reads.
+        """
         try:
-            return super().invoke(ctx)
+            with inputs.of_one_command():
+                self._note_inputs(ctx.params)
+                return super().invoke(ctx)
         except InvalidValueError as error:
             said = by_option(str(error), [name for one in self.params for name in one.opts])
             if said == str(error):
                 raise
             raise InvalidValueError(said) from error
+
+    def _note_inputs(self, given: Mapping[str, Any]) -> None:
+        """A scene's name, say, that a folder happens to have, is not that folder."""
+        words = [
+            (name, Path(word))
+            for name, value in given.items()
+            for word in (value if isinstance(value, (list, tuple)) else [value])
+            if isinstance(word, (str, Path)) and str(word)
+        ]
+        for name, path in words:
+            if name not in WRITTEN and not (name in COMPLETED and path.is_dir()):
+                inputs.note(path)
+        inputs.refuse(*(path for name, path in words if name in WRITTEN))
 
 
 def completed(_ctx: Any, parameter: Any, incomplete: str) -> list[str]:

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Output folders that appear whole or not at all, and the recipe that says what made them."""
+"""Output folders that grow, and the recipe that says what made a folder."""
 
 import json
 import math
@@ -12,8 +12,8 @@ from typing import Any
 
 from scripts.machine import versions
 from sim.core.versions import WORLD
-from sim.recording.sums import check_vouched, write_sums
-from slam import files, locks
+from sim.recording.sums import check_vouched, tree, write_sums
+from slam import files, inputs, locks
 from slam.bounded import json_of
 from slam.errors import LogFormatError, OutputError
 from slam.names import NameFromFile
@@ -26,47 +26,13 @@ GROWING = (
     "leaderboard.json", "leaderboard.md", "submission_*.json", "days.json",
     "*lives/*.json", "*lives/*.json.sha256",
 )  # fmt: skip
-OLD = ".old"  # of the earlier run, while a new one takes its place
 FOREIGN = "{} holds files that mobilia did not write: choose another --out"
 STAGED, READY = ".tables.part", ".tables.ready"  # of ``together``, before and after it counts
 MAX_RECIPE_BYTES = 1 << 20
 
 
 @contextmanager
-def whole_folder(
-    path: Path, *, overwrite: bool, command: str = "", settings: Mapping[str, Any] | None = None
-) -> Iterator[Path]:
-    """Yield a temporary folder beside ``path``; it takes the name ``path`` when the block succeeds.
-
-    command, settings  as ``write_recipe`` gets them: only for a folder whose recipe has the same
-                       does the error name --overwrite as a way out
-
-    Raises ``OutputError`` when ``path`` exists and ``overwrite`` is off, when it exists and holds
-    no recipe of ours (then it is somebody else's and never replaced), or cannot be written. On any
-    failure, Ctrl-C included, the temporary folder is removed and an earlier run stays as it was.
-    What killed runs left is removed first. After a power cut the new or the earlier run is there
-    (where the file system cannot swap two names, the earlier one perhaps as .NAME.PID.old).
-    """
-    said, path = path, path.absolute()
-    temporary = path.with_name(f".{path.name}.{os.getpid()}{files.PART}")
-    made: list[Path] = []
-    try:
-        with _told(said, temporary):
-            made = files.make_folder(path.parent)
-            _refuse(path, overwrite, command, settings or {})
-            files.clear_parts(path)
-            temporary.mkdir()
-            with files.locked(temporary):
-                yield temporary
-                write_sums(temporary)
-                _take_place(temporary, path)
-    finally:
-        files.remove(temporary)
-        files.remove_empty(made)
-
-
-@contextmanager
-def _told(said: Path, temporary: Path | None = None) -> Iterator[None]:
+def told(said: Path, temporary: Path | None = None) -> Iterator[None]:
     """Errors of the system as ``OutputError``, which names what the user named."""
     try:
         yield
@@ -80,20 +46,21 @@ def _told(said: Path, temporary: Path | None = None) -> Iterator[None]:
 
 
 @contextmanager
-def locked_folder(out: Path) -> Iterator[None]:
-    """A folder of ours that grows, and nobody else's at the moment.
+def locked_folder(out: Path, command: str) -> Iterator[None]:
+    """A folder of ours that grows by ``command``, and nobody else's at the moment.
 
-    Raises ``OutputError`` for one that holds files without a recipe, is being written now, or
-    cannot be written.
+    Raises ``OutputError`` for one that holds files without a recipe of that, is being written now,
+    holds links, or cannot be written.
     """
     made: list[Path] = []
     try:
-        with _told(out):
+        with told(out):
             made = files.make_folder(out)
-            ours = (out / RECIPE).exists()
             names = (f.name for f in out.iterdir())
-            if not ours and any(n not in locks.NAMES and not files.is_part(n) for n in names):
-                raise OutputError(FOREIGN.format(out))
+            if any(name not in locks.NAMES and not files.is_part(name) for name in names):
+                words = words_of_ours(out)
+                if words["command"] != command:
+                    raise OutputError(another(out, words))
             with locks.locked(out):
                 yield
     finally:
@@ -113,11 +80,12 @@ def together(folder: Path) -> Iterator[Path]:
     put_tables(folder)
     staged = folder / STAGED
     try:
-        with _told(folder, staged):
+        with told(folder, staged):
             files.remove(staged)
             staged.mkdir()
             yield staged
             write_sums(staged, GROWING, over=folder)
+            inputs.refuse(*(folder / name for name in tree(staged)[0]))
             files.put(staged, folder / READY)
     finally:
         files.remove(staged)
@@ -131,7 +99,7 @@ def result_folder(
     """``locked_folder`` with its recipe there from the start; yields what its tables are written
     in: ``together``, which ends with the recipe.
     """
-    with locked_folder(out):
+    with locked_folder(out, command):
         if not (out / RECIPE).exists():  # else that of the tables there stays with them
             write_recipe(out, command, settings)
 
@@ -149,7 +117,7 @@ def put_tables(folder: Path) -> None:
     ready = folder / READY
     if not ready.is_dir():
         return
-    with _told(folder):
+    with told(folder):
         places = {folder}
         for file in sorted(file for file in ready.rglob("*") if file.is_file()):
             place = folder / file.relative_to(ready)
@@ -170,59 +138,28 @@ def check_whole(folder: Path) -> None:
         )
 
 
-def _refuse(path: Path, overwrite: bool, command: str, settings: Mapping[str, Any]) -> None:
-    if not path.exists():
-        return
-    if not path.is_dir():
-        raise OutputError(f"{path} is a file; --out needs a folder")
-    if not any(path.iterdir()):
-        return
-    if not (path / RECIPE).exists():
-        raise OutputError(FOREIGN.format(path))
-    if not overwrite:
-        raise OutputError(_what_lies_there(path, command, settings))
+def words_of_ours(folder: Path) -> dict[str, Any]:
+    """Of the recipe of an earlier result; ``OutputError`` for a folder of somebody else.
 
-
-def _what_lies_there(path: Path, command: str, settings: Mapping[str, Any]) -> str:
-    """What the folder of ours at ``path`` holds, and what to do about it."""
-    another = "choose another --out"
+    Hashes are left alone: those of a folder whose tables were stopped on the way do not fit yet.
+    """
+    if not os.path.lexists(folder / RECIPE):
+        raise OutputError(FOREIGN.format(folder))
     try:
-        words = read_recipe_words(path / RECIPE)
-    except LogFormatError:
-        return f"{path} holds an earlier result, whose recipe cannot be read: {another}"
-    if words.get("command") != command:
-        return f"{path} holds what mobilia {words.get('command')!s:.40} wrote: {another}"
-    theirs, ours = words.get("settings"), json.loads(json.dumps(_plain(settings)))
-    if theirs == ours:
-        return (
-            f"{path} holds an earlier run of the same settings: pass --overwrite to replace it, "
-            "or another --out"
-        )
-    there: Mapping[str, Any] = theirs if isinstance(theirs, dict) else {}
-    keys = sorted(key for key in {*there, *ours} if there.get(key) != ours.get(key))
-    differ = ", ".join(f"{key} {there.get(key)!r:.40} there, {ours.get(key)!r:.40} now"
-                       for key in keys[:3])  # fmt: skip
-    return f"{path} holds another run ({differ}): {another}"
+        words = json_of(folder / RECIPE, MAX_RECIPE_BYTES, "recipe", strict=False)
+    except LogFormatError as error:
+        raise OutputError(
+            f"{folder} holds an earlier result, whose recipe cannot be read: choose another --out "
+            f"({error})"
+        ) from error
+    if not isinstance(words.get("command"), str) or not isinstance(words.get("settings"), dict):
+        raise OutputError(FOREIGN.format(folder))
+    return words
 
 
-def _take_place(temporary: Path, path: Path) -> None:
-    """Move the new folder in and the old one out, at once where the system can do that."""
-    if not path.exists():
-        files.put(temporary, path)
-        return
-    files.sync_tree(temporary)
-    if files.exchange(temporary, path):
-        files.sync_names(path.parent)  # the old one has the temporary name, which is removed
-        return
-    aside = path.with_name(f".{path.name}.{os.getpid()}{OLD}")
-    path.rename(aside)
-    try:
-        temporary.rename(path)
-    except OSError:
-        aside.rename(path)
-        raise
-    files.sync_names(path.parent)
-    files.remove(aside)
+def another(folder: Path, words: Mapping[str, Any]) -> str:
+    """That the folder is of another command, as its recipe says."""
+    return f"{folder} holds what mobilia {words['command']:.40} wrote: choose another --out"
 
 
 def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> None:
@@ -230,7 +167,7 @@ def write_recipe(folder: Path, command: str, settings: Mapping[str, Any]) -> Non
 
     Beside them the numbers of the SLAMs that ``slams`` or ``slam`` of the settings name.
     """
-    recipe = {"schema": 1, "command": command, "settings": _plain(settings), "versions": versions()}
+    recipe = {"schema": 1, "command": command, "settings": plain(settings), "versions": versions()}
     recipe["world"] = WORLD
     named = settings.get("slams", [settings["slam"]] if "slam" in settings else [])
     if configs := configs_of(named):
@@ -250,12 +187,12 @@ def configs_of(slams: Iterable[str]) -> dict[str, Any]:
     return found
 
 
-def _plain(value: Any) -> Any:
+def plain(value: Any) -> Any:
     """``value`` as strict JSON has it: no infinities (a stay that never ends is "inf")."""
     if isinstance(value, Mapping):
-        return {str(key): _plain(item) for key, item in value.items()}
+        return {str(key): plain(item) for key, item in value.items()}
     if isinstance(value, (list, tuple)):
-        return [_plain(item) for item in value]
+        return [plain(item) for item in value]
     if isinstance(value, float) and not math.isfinite(value):
         return str(value)
     return value

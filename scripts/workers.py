@@ -3,6 +3,7 @@
 
 import ctypes
 import importlib
+import logging
 import os
 import signal
 import sys
@@ -11,7 +12,7 @@ import time
 import uuid
 import warnings
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import ExitStack, nullcontext, suppress
+from contextlib import ExitStack, contextmanager, nullcontext, suppress
 from pathlib import Path
 from typing import Any, TypeVar
 
@@ -104,9 +105,26 @@ def _processes(stack: ExitStack, jobs: int) -> dict[str, Any]:
 def _cluster(stack: ExitStack, address: str, shared: Path | None) -> dict[str, Any]:
     """The workers of a Dask scheduler, connected until ``stack`` ends; as joblib takes it."""
     client = stack.enter_context(_client(address))
+    stack.enter_context(_attended(client, address))
     if shared is not None:
         _check_shared(client, shared)
     return {"backend": "dask", "wait_for_workers_timeout": WORKERS_TIMEOUT_S}
+
+
+@contextmanager
+def _attended(client: Any, address: str) -> Iterator[None]:
+    """``MobiliaError`` where the scheduler has gone, whatever the libraries make of that."""
+    try:
+        yield
+    except MobiliaError:
+        raise
+    except Exception as error:
+        if client.status == "running":
+            raise
+        raise MobiliaError(
+            f"the Dask scheduler at {address} has gone; with another one, the same command again "
+            "goes on from here"
+        ) from error
 
 
 def check_jobs(jobs: int) -> None:
@@ -160,6 +178,7 @@ def _client(address: str) -> Any:
         raise MissingDependencyError(
             "--cluster needs Dask: pip install 'mobilia[cluster]'"
         ) from error
+    logging.getLogger("distributed.client").setLevel(logging.CRITICAL)  # here it is said in a line
     try:
         return distributed.Client(address, timeout="10s", set_as_default=True)
     except (OSError, ValueError, TypeError) as error:

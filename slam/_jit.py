@@ -9,14 +9,19 @@ Numba's cache looks at the file of the kernel itself only; a kernel that calls o
 would keep its old code after that module changed. So the files of imported kernels count too, and
 the values of the module constants that a kernel and its callees use, which may come from elsewhere
 (a tree of numbers, say).
+
+Each file of the cache ends with the hash of what is before it, and has its name once it is on the
+disk. One that is torn, flipped or empty is as if it were not there: code that is damaged would end
+the process, without a word.
 """
 
 import gc
 import hashlib
 import logging
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager
+from contextlib import contextmanager, suppress
 from functools import partial
+from io import BytesIO
 from pathlib import Path
 from types import ModuleType
 from typing import Any, ParamSpec, TypeVar
@@ -27,6 +32,8 @@ from slam._numba import link_once  # before anything else imports Numba
 # isort: on
 import numba
 from numba.core import event
+
+from slam.files import write_bytes
 
 _log = logging.getLogger(__name__)
 _cache_is_writable = True
@@ -98,7 +105,8 @@ def _watch_callees(dispatcher: Any, function: Any) -> None:
     index = getattr(getattr(dispatcher, "_cache", None), "_cache_file", None)
     if index is None:
         return
-    index._load_index = _or_nothing(index._load_index)
+    index._load_index, index._load_data = _undamaged(index)
+    index._open_for_write = _whole
     index.save = partial(_save, index)
     if files or constants:
         digest = hashlib.sha256(b"".join(Path(f).read_bytes() for f in sorted(files)))
@@ -126,24 +134,53 @@ def _save(index: Any, key: Any, data: Any) -> None:
 
     Numba numbers the files: of two processes that compile at once, one may then load what the
     other compiled for other types. Named after what they hold, and written before the index names
-    them, they are always right; an entry lost to the other process is compiled once more.
+    them, they are always right; an entry lost to the other process is compiled once more, and so
+    is one for which the disk has no room.
     """
     held = hashlib.sha256(index._dump((index._source_stamp, key))).hexdigest()[:16]
     name = index._data_name_pattern.replace("{number:d}", held)
-    index._save_data(name, data)
-    index._save_index({**index._load_index(), key: name})
+    with suppress(OSError):
+        index._save_data(name, data)
+        index._save_index({**index._load_index(), key: name})
 
 
-def _or_nothing(load: Callable[[], dict[Any, Any]]) -> Callable[[], dict[Any, Any]]:
-    """A cache of an older version may name types that are gone: then there is nothing in it."""
+@contextmanager
+def _whole(path: str) -> Iterator[BytesIO]:
+    """A file of the cache to be written; Numba, which unpickles it, sees no hash at its end."""
+    held = BytesIO()
+    yield held
+    data = held.getvalue()
+    write_bytes(Path(path), data + hashlib.sha256(data).digest())
 
-    def loaded() -> dict[Any, Any]:
+
+def _is_whole(path: str) -> bool:
+    try:
+        held = Path(path).read_bytes()
+    except OSError:
+        return False
+    size = hashlib.sha256().digest_size
+    return hashlib.sha256(held[:-size]).digest() == held[-size:]
+
+
+def _undamaged(index: Any) -> tuple[Callable[[], dict[Any, Any]], Callable[[str], Any]]:
+    """Its readers of the index and of an entry, for which nothing is there but what is whole.
+
+    A cache of an older version may name types that are gone: then there is nothing in it.
+    """
+    load_index, load_data = index._load_index, index._load_data
+
+    def entries() -> dict[Any, Any]:
         try:
-            return load()
+            return load_index() if _is_whole(index._index_path) else {}
         except (AttributeError, ImportError):
             return {}
 
-    return loaded
+    def entry(name: str) -> Any:
+        if not _is_whole(index._data_path(name)):
+            raise FileNotFoundError(name)  # which Numba expects
+        return load_data(name)
+
+    return entries, entry
 
 
 COMPILING = "numba:compile"

@@ -12,12 +12,14 @@ import fcntl
 import os
 import re
 import shutil
+import stat
 import tempfile
 from collections.abc import Iterator
 from concurrent.futures import ThreadPoolExecutor
 from contextlib import contextmanager, suppress
 from pathlib import Path
 
+from slam import inputs
 from slam.errors import OutputError
 
 PART = ".part"
@@ -28,6 +30,7 @@ _FULL = (errno.ENOSPC, errno.EDQUOT)
 _VAGUE = (None, errno.EPIPE, errno.EIO)  # what libraries and pipes make of a full disk
 _UNSYNCED = (errno.EINVAL, errno.ENOTSUP, errno.EACCES)  # folders of some file systems
 _EXCHANGE, _HERE = 2, -100  # RENAME_EXCHANGE, AT_FDCWD of Linux
+UNFOLLOWED = os.O_NOFOLLOW | os.O_NONBLOCK  # opens no link, and waits at no named pipe
 
 
 @contextmanager
@@ -37,17 +40,19 @@ def replacing(path: Path) -> Iterator[Path]:
     On any exception, Ctrl-C included, the temporary file and the folders made for it are removed
     and ``path`` stays as it was. What killed runs left of ``path`` is removed first. The suffix of
     ``path`` is kept, because writers choose formats by it. Raises ``OutputError`` when it cannot be
-    written.
+    written, or is read by the same command.
     """
     if not path.name:
         raise OutputError(f"cannot write {path}: not a file name")
+    inputs.refuse(path)
     temporary = part_of(path)
     made: list[Path] = []
     done = False
     try:
         made = make_folder(path.parent)
         clear_parts(path)
-        temporary.touch()
+        temporary.unlink(missing_ok=True)
+        temporary.touch(exist_ok=False)  # a file of its own, whatever lies there
         with locked(temporary):
             yield temporary
             put(temporary, path)
@@ -71,7 +76,10 @@ def write_bytes(path: Path, data: bytes) -> None:
 
 def write_text(path: Path, text: str) -> None:
     """``path.write_text`` in UTF-8 that appears whole or not at all."""
-    write_bytes(path, text.encode("utf-8"))
+    try:
+        write_bytes(path, text.encode("utf-8"))
+    except UnicodeEncodeError as error:
+        raise OutputError(f"cannot write {path}: it would hold a name that is no UTF-8") from error
 
 
 def part_of(path: Path) -> Path:
@@ -91,7 +99,7 @@ def unfinished(path: Path) -> bool:
 
 def sync(path: Path) -> None:
     """Wait until the bytes of a file, or the names in a folder, are on the disk."""
-    number = os.open(path, os.O_RDONLY)
+    number = os.open(path, os.O_RDONLY | os.O_NONBLOCK)
     try:
         os.fsync(number)
     except OSError as error:
@@ -118,7 +126,7 @@ def sync_tree(path: Path) -> None:
     with ThreadPoolExecutor(SYNCS_AT_ONCE) as pool:
         for folder, _, names in os.walk(path, topdown=False):
             inside = [Path(folder, name) for name in sorted(names)]
-            list(pool.map(sync, [file for file in inside if not file.is_symlink()]))
+            list(pool.map(sync, [file for file in inside if stat.S_ISREG(file.lstat().st_mode)]))
             sync(Path(folder))
 
 
@@ -149,6 +157,23 @@ def remove_empty(folders: list[Path]) -> None:
             folder.rmdir()
 
 
+def refuse_links(*paths: Path) -> None:
+    """``OutputError`` where one of these, or anything in them, is neither a file nor a folder.
+
+    What we write through a link lands elsewhere, what we write to a named pipe waits for ever.
+    """
+    waiting = list(paths)
+    while waiting:
+        path = waiting.pop()
+        with suppress(FileNotFoundError):  # of a worker, that has ended meanwhile
+            mode = path.lstat().st_mode
+            if stat.S_ISDIR(mode):
+                waiting += path.iterdir()
+            elif not stat.S_ISREG(mode):
+                what = "a link" if stat.S_ISLNK(mode) else "no file"
+                raise OutputError(f"{path} is {what}, in a folder that is written: move it away")
+
+
 def exchange(first: Path, second: Path) -> bool:
     """Swap the names of two things at once; False where the system cannot."""
     rename = getattr(ctypes.CDLL(None, use_errno=True), "renameat2", None)
@@ -165,7 +190,7 @@ def exchange(first: Path, second: Path) -> bool:
 @contextmanager
 def locked(part: Path) -> Iterator[None]:
     """While a temporary file or folder is being written, nobody takes it for a left one."""
-    number = os.open(part, os.O_RDONLY)
+    number = os.open(part, os.O_RDONLY | UNFOLLOWED)
     try:
         with suppress(OSError):  # a file system without locks
             fcntl.flock(number, fcntl.LOCK_EX | fcntl.LOCK_NB)
@@ -189,7 +214,7 @@ def clear_parts(path: Path) -> None:
 
 def _is_left(part: Path) -> bool:
     try:
-        number = os.open(part, os.O_RDONLY)
+        number = os.open(part, os.O_RDONLY | UNFOLLOWED)
     except OSError:
         return False
     try:

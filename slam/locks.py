@@ -6,7 +6,7 @@ are two files: ``.lock``, held by the writer, and ``.lock.workers``, held by its
 do a job. The next writer waits until those have ended and writes a new ticket into the latter; a
 worker that comes with an old ticket does nothing. Locks are ``flock``: over NFS they hold between
 machines where the mount has them (not with ``nolock`` or ``local_lock``), for workers of one thread
-each.
+each. What lies in a folder to be locked must be files and folders, no link above all.
 """
 
 import fcntl
@@ -19,6 +19,7 @@ from pathlib import Path
 from typing import IO
 
 from slam.errors import OutputError
+from slam.files import UNFOLLOWED, refuse_links
 
 LOCK = ".lock"
 WORKERS = ".lock.workers"
@@ -32,10 +33,11 @@ def locked(folder: Path) -> Iterator[None]:
     """``folder``, which must exist, is this writer's alone.
 
     Raises ``OutputError`` when another writes there, or workers of one that is over still do after
-    ``WAIT_S``; ``OSError`` when the folder cannot be written.
+    ``WAIT_S``, and as ``refuse_links``; ``OSError`` when the folder cannot be written.
     """
+    refuse_links(*folder.iterdir())
     with _alone(folder):
-        with (folder / WORKERS).open("a") as workers:
+        with _opened(folder / WORKERS) as workers:
             if not _got(workers, fcntl.LOCK_EX, WAIT_S):
                 raise OutputError(
                     f"{folder} is still being written by workers of an earlier command: "
@@ -56,7 +58,7 @@ def _alone(folder: Path) -> Iterator[None]:
     """Hold the writer's lock; on a new file where its last holder has just removed the old one."""
     path = folder / LOCK
     while True:
-        with path.open("a") as held:
+        with _opened(path) as held:
             try:
                 fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
             except BlockingIOError as error:
@@ -64,6 +66,16 @@ def _alone(folder: Path) -> Iterator[None]:
             if _same(held, path):
                 yield
                 return
+
+
+def _opened(path: Path, mode: str = "a") -> IO[str]:
+    """Itself, not what it links to."""
+    return open(
+        path,
+        mode,
+        encoding="ascii",
+        opener=lambda name, how: os.open(name, how | UNFOLLOWED, 0o666),
+    )
 
 
 def _same(held: IO[str], path: Path) -> bool:
@@ -86,8 +98,8 @@ def _got(file: IO[str], kind: int, wait_s: float) -> bool:
 
 def ticket(folder: Path) -> str:
     """What the workers of the present writer are to show; "" where ``folder`` is not locked."""
-    with suppress(FileNotFoundError):
-        return (folder / WORKERS).read_text(encoding="ascii")
+    with suppress(FileNotFoundError), _opened(folder / WORKERS, "r") as workers:
+        return workers.read()
     return ""
 
 
@@ -106,7 +118,7 @@ def working(folder: Path, shown: str) -> Iterator[None]:
 @contextmanager
 def _shared(folder: Path) -> Iterator[str]:
     try:
-        file = (folder / WORKERS).open(encoding="ascii")
+        file = _opened(folder / WORKERS, "r")
     except FileNotFoundError:
         yield ""
         return
@@ -122,6 +134,6 @@ def _shared(folder: Path) -> Iterator[str]:
 
 def idle(folder: Path, wait_s: float = WAIT_S) -> bool:
     """Wait until no worker has a job in ``folder``; False when one still has after ``wait_s``."""
-    with suppress(FileNotFoundError), (folder / WORKERS).open("a") as workers:
+    with suppress(FileNotFoundError), _opened(folder / WORKERS) as workers:
         return _got(workers, fcntl.LOCK_EX, wait_s)
     return True

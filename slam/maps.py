@@ -14,6 +14,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slam import inputs
 from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Raster
@@ -38,6 +39,8 @@ MAX_PNG_PIXELS = 178_956_970  # what Pillow unpacks, four bytes each
 _MAX_YAML_BYTES = 1 << 16
 _EDITED = ": the sum differs (after a change on purpose, delete the two lines of sums in the YAML)"
 _IMAGE_SUM, _FIELDS_SUM = "sha256 of the image:", "sha256 of the lines below:"
+_SUMS = re.compile(rf"# {_IMAGE_SUM} ([0-9a-f]{{64}})\n# {_FIELDS_SUM} ([0-9a-f]{{64}})\n")
+_OF_SUMS = re.compile(rf"{_IMAGE_SUM}|{_FIELDS_SUM}|\b[0-9a-f]{{64}}\b")  # what is left of damaged
 
 
 def write_map(stem: Path, raster: Raster) -> tuple[Path, Path]:
@@ -222,13 +225,14 @@ def has_sums(yaml: Path) -> bool:
 
 def _checked_sums(yaml: Path, text: str) -> str | None:
     """The image's sum that ``write_map`` noted, None where there is none; checks the fields'."""
-    first, _, rest = text.partition("\n")
-    second, _, fields = rest.partition("\n")
-    if not first.startswith(f"# {_IMAGE_SUM} ") or not second.startswith(f"# {_FIELDS_SUM} "):
+    found = _SUMS.match(text)
+    if found is None:
+        if _OF_SUMS.search(text):
+            raise LogFormatError(yaml, f"its sums are not those that were written{_EDITED}")
         return None
-    if second.split()[-1] != _sha256(fields.encode()):
+    if found[2] != _sha256(text[found.end() :].encode()):
         raise LogFormatError(yaml, f"its fields are not those that were written{_EDITED}")
-    return first.split()[-1]
+    return found[1]
 
 
 def _sha256(data: bytes) -> str:
@@ -240,6 +244,7 @@ def _read_image(
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
     """Gray values, and which pixels are opaque where the image says so."""
     data = bytes_of(path, MAX_PIXELS + _MAX_HEADER_BYTES)
+    inputs.note(path)
     if image_sum is not None and _sha256(data) != image_sum:
         raise LogFormatError(path, f"is not the image that was written{_EDITED}")
     if data.startswith(b"\x89PNG"):

@@ -8,6 +8,7 @@ import os
 import re
 import subprocess
 import sys
+import tomllib
 import zipfile
 from pathlib import Path
 
@@ -104,11 +105,36 @@ def test_a_module_and_a_missing_package_get_a_sentence_too(wheel: Path, tmp_path
     assert "hides the package 'slam'" in done.stdout or "is missing in" in done.stdout
 
 
-def test_the_lock_of_what_runs_is_a_part_of_the_lock():
-    def pins(name: str) -> set[str]:
-        text = (REPO / name).read_text().replace("\\\n", " ")
-        return {re.sub(r" ;.*?(?= --hash)", "", " ".join(x.split())) for x in text.splitlines()}
+def pins(name: str) -> set[str]:
+    text = (REPO / name).read_text().replace("\\\n", " ")
+    return {re.sub(r" ;.*?(?= --hash)", "", " ".join(x.split())) for x in text.splitlines()}
 
+
+def test_the_lock_of_what_ci_adds_has_the_extra_at_the_versions_of_the_lock():
+    project = tomllib.loads((REPO / "pyproject.toml").read_text())
+    extra, ci = project["project"]["optional-dependencies"]["ros2"], pins("requirements-ci.lock")
+    assert {*extra} < {*project["dependency-groups"]["ci"]}
+    assert {"cyclonedds", "eclipse-zenoh", "uv"} <= {re.split(r"[=\[ ]", pin)[0] for pin in ci}
+    names = {re.split(r"[=\[ ]", pin)[0]: pin for pin in pins("requirements.lock")}
+    assert all(names.get(re.split(r"[=\[ ]", pin)[0], pin) == pin for pin in ci)
+
+
+@pytest.mark.parametrize("name", sorted(path.name for path in REPO.glob("requirements*.lock")))
+def test_every_line_of_a_lock_has_a_hash_and_none_an_address(name: str):
+    assert all("==" in pin and " --hash=sha256:" in pin for pin in pins(name))
+    assert "://" not in (REPO / name).read_text()
+
+
+def test_nothing_is_installed_without_hashes():
+    """``pip install`` in what sets up, tests and locks: ours alone, which has none."""
+    for name in ("Makefile", ".ci/run", ".ci/wheel"):
+        text = (REPO / name).read_text().replace("$(PIP)", "pip install")
+        for line in text.splitlines():
+            if "pip install" in line and not line.startswith(("PIP ", "#")):
+                assert "--require-hashes" in line or "--no-deps" in line, line
+
+
+def test_the_lock_of_what_runs_is_a_part_of_the_lock():
     run, whole = pins("requirements-run.lock"), pins("requirements.lock")
     assert run <= whole
     names = {re.split(r"[=\[ ]", pin)[0] for pin in run}

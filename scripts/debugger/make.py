@@ -28,7 +28,8 @@ from scripts.debugger.question import Question
 from scripts.debugger.recording import Case, Strip, Tape, record, simulate
 from scripts.debugger.words import as_json, headline, who
 from scripts.figures import save, styled
-from scripts.output import whole_folder, write_recipe
+from scripts.output import write_recipe
+from scripts.whole_folder import whole_folder
 from sim.twins.absence import Change
 from sim.view.mapview import FOOT_PX, MapView
 from sim.view.scans import beams

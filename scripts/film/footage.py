@@ -23,6 +23,7 @@ from slam.errors import (
     LogFormatError,
     NeedsLabelsError,
     UnknownNameError,
+    printable,
 )
 from slam.frames import NS_PER_S, Float, Stream
 from slam.logs import open_log
@@ -61,6 +62,9 @@ class Footage:
     empty: float = 0.0
     tested: MountingTest | None = None
     made_with: Mapping[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        self.title = printable(self.title)  # a file may be called anything
 
     def show(self, slams: Sequence[str], *, pace: Pace | None = None, size: Size = SIZE) -> Show:
         """A show of the first of ``slams``, with the others and odometry beside it.

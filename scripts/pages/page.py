@@ -113,7 +113,7 @@ def write(folder: Path, page: Page) -> Path:
         parts=[(one, None if one.table is None else of_printed(one.table)) for one in parts],
         film=(folder / "film.mp4").exists(), replay=(folder / "replay.html").exists(),
     )  # fmt: skip
-    write_text(path, text)
+    write_text(path, text.encode("utf-8", "backslashreplace").decode())  # names are any bytes
     return path
 
 

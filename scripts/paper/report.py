@@ -21,7 +21,7 @@ from scripts.marks import table
 from scripts.output import write_recipe
 from scripts.paper.runs import Plan, Run, checksums, load_run, spread
 from slam import create
-from slam.files import replacing, write_text
+from slam.files import refuse_links, replacing, write_text
 from slam.frames import Float
 
 COLORS = {
@@ -72,13 +72,16 @@ _STATISTICS = (("mean", "mean(e)", 0), ("var_e", "var(e)", 1), ("var_p", "var(p)
 
 @dataclass(eq=False)
 class Report:
-    """One experiment's folder."""
+    """One experiment's folder; raises as ``refuse_links``."""
 
     name: str
     plan: Plan
     lines: list[str] = field(default_factory=list)
     quoted: list[str] = field(default_factory=list)  # what the page of all experiments repeats
     recipe: dict[str, Any] = field(default_factory=dict)
+
+    def __post_init__(self) -> None:
+        refuse_links(self.folder)
 
     @property
     def folder(self) -> Any:

@@ -19,6 +19,7 @@ from scenes.from_map.survey import raster_of
 from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
 from scenes.scene import Scene
+from scripts.whole_folder import check_place
 from sim.driving.drive import TourConfig
 from sim.driving.navgrid import NavGrid
 from sim.view.mapview import MapView
@@ -293,12 +294,10 @@ def made(  # noqa: PLR0913 (by keyword)
 ) -> Made:
     """Write STEM.toml, STEM.xml and STEM.png.
 
-    Raises ``InvalidValueError`` as ``scenes.from_map.plan``, and for files that are there already.
+    Raises ``InvalidValueError`` as ``scenes.from_map.plan``, and as ``check_place``.
     """
-    picture = stem.with_name(stem.name + ".png")
-    for file in (stem.with_name(stem.name + ".toml"), stem.with_name(stem.name + ".xml"), picture):
-        if file.exists() and not overwrite:
-            raise InvalidValueError(f"{file} is there already: --overwrite replaces it")
+    *others, picture = (stem.with_name(stem.name + end) for end in (".toml", ".xml", ".png"))
+    check_place(*others, picture, overwrite=overwrite)
     drawn = plan(map_, options, source=source)
     stem.parent.mkdir(parents=True, exist_ok=True)
     with replacing(picture) as new:

@@ -17,6 +17,7 @@ from scripts.film.encode import Pace
 from scripts.film.footage import Footage, of_log, of_scene
 from scripts.pace import Work, announce, timed
 from scripts.single_run.session import Outputs, run_session
+from slam import inputs
 from slam.days.history import History
 from slam.days.session import Session, keep, read_history
 from slam.errors import InvalidValueError, MobiliaError
@@ -91,6 +92,8 @@ def kept(session: Session, maps: Maps) -> None:
     """Write the map where ``--map-out``, else ``--map-in``, says, and tell how it went."""
     target = maps.map_out or maps.map_in
     assert target is not None
+    if maps.map_out is None:
+        inputs.release(target)  # the one that goes on from day to day
     state = session.state
     written = keep(session, target)
     if state.found_after_s is None:

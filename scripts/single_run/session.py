@@ -27,10 +27,11 @@ from scripts.live.replay import Recorder
 from scripts.machine import machine
 from scripts.metrics.judged import in_first_frame
 from scripts.names import file_name
-from scripts.output import whole_folder, write_recipe
+from scripts.output import write_recipe
 from scripts.pages import page as pages
 from scripts.pages.page import Page, Part, command
 from scripts.single_run import score
+from scripts.whole_folder import whole_folder
 from sim.view.draw import Picture
 from slam.errors import InvalidValueError
 from slam.estimate import Changes, Raster

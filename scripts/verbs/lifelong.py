@@ -113,9 +113,10 @@ def _write(
     from scripts.days import lifelong as life
     from scripts.days import tables
     from scripts.days.report import Changed, changes_of
-    from scripts.output import whole_folder, write_recipe
+    from scripts.output import write_recipe
     from scripts.pages.page import Page, Part, command, tell
     from scripts.pages.page import write as write_page
+    from scripts.whole_folder import whole_folder
 
     settings = {"slams": names, **settings}
     path = out or Path("out") / "lifelong"

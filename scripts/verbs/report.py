@@ -37,6 +37,7 @@ def report(
     [bold]mobilia report out/compare --subject ekf[/bold]
     """
     from scripts.closed_loop.tables import driven, drives_in
+    from scripts.output import locked_folder
     from scripts.report import page
     from scripts.report.answer import failed
     from scripts.report.study import check_comparison, study
@@ -44,18 +45,19 @@ def report(
     check_comparison(folder)
     found = [*(drive or []), *drives_in(folder)]
     about = study(folder, subject)
-    with working("drawing the page"):
-        path = page.write(about, [driven(one) for one in found])
-    for line in failed(about.compared.runs, about.axis):
-        fact(line, bad=True)
-    for line in page.answers(about):
-        fact(line)
-    for line in page.blame_worst(about):
-        say(f"What misled it: [bold]{escape(line)}[/bold]", highlight=False)
-    if replays:
-        with working("replaying the worst runs"):
-            made = _replays(about)
-        say(f"Wrote [bold]{escape(', '.join(made))}[/bold].")
+    with locked_folder(folder, "compare"):
+        with working("drawing the page"):
+            path = page.write(about, [driven(one) for one in found])
+        for line in failed(about.compared.runs, about.axis):
+            fact(line, bad=True)
+        for line in page.answers(about):
+            fact(line)
+        for line in page.blame_worst(about):
+            say(f"What misled it: [bold]{escape(line)}[/bold]", highlight=False)
+        if replays:
+            with working("replaying the worst runs"):
+                made = _replays(about)
+            say(f"Wrote [bold]{escape(', '.join(made))}[/bold].")
     say(f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).")
 
 

@@ -34,6 +34,10 @@ def sensor_card(
     [bold]mobilia sensor-card --scanner utm30lx[/bold]
     [bold]mobilia sensor-card --log robot.log[/bold]
     """
+    if out is not None:
+        from slam.files import refuse_links
+
+        refuse_links(out / "pictures", out / "results")
     if log:
         beside_log(log, scanner, out, text_format=text_format, strict=strict)
         return

@@ -53,12 +53,14 @@ def twin(
             f"--crowd needs a --motion above 0 and up to 1, and the reverse: {crowd}, {motion:g}"
         )
     folder = out or Path("out") / f"twin-{run_name(log)}"
-    if (folder / "twin.json").exists() and not overwrite:
-        raise InvalidValueError(f"{folder} has a twin already: --overwrite replaces it")
+    building = [] if scene is not None else ["building.toml", "building.xml"]
+    names = ("twin.log", "twin.json", "differences.png", *building)
     from scripts.log_twin import make
+    from scripts.whole_folder import check_place
     from slam.files import write_text
     from slam.logs import write_carmen
 
+    check_place(*(folder / name for name in names), overwrite=overwrite)
     folder.mkdir(parents=True, exist_ok=True)
     with working(f"reading {log.name}"):
         read = make.recorded(log, poses)

@@ -4,6 +4,7 @@
 import hashlib
 import struct
 import sys
+import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
 from io import BytesIO
@@ -40,11 +41,47 @@ _OPTIONS: dict[int, int] = {
     zstd.CompressionParameter.compression_level: LEVEL,
     zstd.CompressionParameter.checksum_flag: 1,  # a flipped bit is an error, never another range
 }
+_CHUNK, _DATA_END, _FOOTER = b"\x06", b"\x0f", b"\x02"  # kinds of records, mcap.dev/spec
 _FOREVER = QosTime(9223372036, 854775807)
 _LATCHED = Qos(
     QosHistory.KEEP_LAST, 1, QosReliability.RELIABLE, QosDurability.TRANSIENT_LOCAL,
     _FOREVER, _FOREVER, QosLiveliness.AUTOMATIC, _FOREVER, False,
 )  # fmt: skip
+
+
+class _File:
+    """The file of an MCAP, with the CRC-32 of chunks, data and summary that the library leaves 0.
+
+    chunk_crc  of the next chunk, unpacked
+
+    The library writes a record in three pieces: its kind, its length and what it holds.
+    """
+
+    def __init__(self, storage: Any) -> None:
+        storage.bio.flush()
+        self._file, self._pieces = storage.bio, list[bytearray]()
+        self._crc = zlib.crc32(storage.path.read_bytes())  # of data, then of the summary
+        self.chunk_crc = 0
+        self.tell, self.close = storage.bio.tell, storage.bio.close
+        storage.bio = self
+
+    def write(self, piece: bytes | memoryview) -> None:
+        """Of a record, which is written when it is whole; or the last bytes of the file."""
+        self._pieces.append(bytearray(piece))
+        kind, content = self._pieces[0], self._pieces[-1]
+        if len(kind) == 1 and len(self._pieces) < 3:
+            return
+        if kind == _CHUNK:
+            content[24:28] = self.chunk_crc.to_bytes(4, "little")
+        elif kind == _DATA_END:
+            content[:] = self._crc.to_bytes(4, "little")
+        elif kind == _FOOTER:
+            before = b"".join([*self._pieces[:2], content[:16]])
+            content[16:] = zlib.crc32(before, self._crc).to_bytes(4, "little")
+        record = b"".join(self._pieces)
+        self._pieces.clear()
+        self._crc = 0 if kind == _DATA_END else zlib.crc32(record, self._crc)
+        self._file.write(record)
 
 
 class _Chunks:
@@ -55,12 +92,16 @@ class _Chunks:
     """
 
     def __init__(self, storage: Any) -> None:
-        storage.compressor = lambda chunk: zstd.compress(chunk, options=_OPTIONS)
-        self._storage = storage
+        self._storage, self._file = storage, _File(storage)
+        storage.compressor = self._compressed
         bio = BytesIO()
         bio.write(storage.chunk.bio.getvalue())  # types and topics come before any message
         self._other = type(storage.chunk)(2**63 - 1, 0, bio, defaultdict(list))
         self._bulk = False
+
+    def _compressed(self, chunk: bytes) -> bytes:
+        self._file.chunk_crc = zlib.crc32(chunk)
+        return zstd.compress(chunk, options=_OPTIONS)
 
     def turn_to(self, bulk: bool) -> None:
         """From now on, messages go to that chunk."""

@@ -118,9 +118,6 @@ def _beside(path: Path) -> Path:
 
 def damage_beside(path: Path) -> str:
     """What is wrong with a file by the hash beside it; "" where all is well."""
-    for file in (path, _beside(path)):
-        if file.is_symlink():
-            return f"{file} is a link"
     if not _beside(path).exists():
         return f"{path} has no hash beside it: no {_beside(path).name}"
     try:
@@ -220,10 +217,20 @@ def _hidden(name: str) -> bool:
 
 def check_vouched(path: Path) -> None:
     """Raise ``LogFormatError`` when a SHA256SUMS in the folder of ``path``, or in the one above,
-    lists it with another hash. A file that none lists passes."""
+    lists it with another hash. A file that none lists passes, unless the one beside it lists
+    something that is not there: that may be its own line, with a damaged name."""
+    listed, lost = False, ""
     for folder in (path.parent, path.parent.parent):
         if not (folder / SUMS).is_file():
             continue
-        wanted = read_sums(folder).get(path.relative_to(folder).as_posix())
+        sums = read_sums(folder)
+        wanted = sums.get(path.relative_to(folder).as_posix())
         if wanted is not None and sha256(path) != wanted:
             raise LogFormatError(path, f"damaged: its hash is not that of {folder / SUMS}")
+        listed = listed or wanted is not None
+        if folder == path.parent and not listed:
+            lost = next((name for name in sums if not os.path.lexists(folder / name)), "")
+    if lost and not listed and path.exists():
+        raise LogFormatError(
+            path.parent / SUMS, f"damaged: it lists {lost}, which is not there, and not {path.name}"
+        )

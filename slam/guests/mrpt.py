@@ -173,7 +173,7 @@ class MrptSlam(Guest):
                 file.write(action(stamp_ns, increment, self.motion))
                 file.write(sensed(stamp_ns, ranges, self._spec))
         config = Path(__file__).with_name(self.config).read_text(encoding="utf-8")
-        (folder / "config.ini").write_text(config.format(folder=f"{folder}/log"))
+        (folder / "config.ini").write_text(config.format(folder=f"{folder}/log"), encoding="utf-8")
         words = [self._program, f"{folder}/config.ini", f"{folder}/frames.rawlog"]
         processor_s = wire.run(words, Limits.first_s + len(stamps) * SCAN_LIMIT_S)
         rows = self._log(folder / "log" / "log_estimated_path.txt", self.columns[0])

@@ -313,6 +313,7 @@ def _probe(bag: Bag, topics: Topics) -> tuple[Laser, str]:  # noqa: C901 (one br
     # where nobody says what moves: the usual name, or else the laser itself
     robot = _BASE if topics.odometry is None else None
     mount, start_ns = None, None
+    tried = (0, robot)  # so many transforms, to there
     for topic, log_ns, message in bag.messages(wanted):
         start_ns = log_ns if start_ns is None else start_ns
         with about(bag.path, bag.at):
@@ -328,7 +329,9 @@ def _probe(bag: Bag, topics: Topics) -> tuple[Laser, str]:  # noqa: C901 (one br
                     transforms[edge] = t.transform
             if scans and robot is not None:
                 laser = _frame_name(scans[0].header.frame_id)
-                mount = mounting(transforms, robot, laser)
+                if mount is not None or tried != (len(transforms), robot):
+                    tried = (len(transforms), robot)
+                    mount = mounting(transforms, robot, laser)
                 known = mount is not None or laser == robot or log_ns - start_ns > PROBE_NS
                 if known and (len(scans) > 1 or topics.turns is None):
                     break

@@ -2,7 +2,7 @@
 """A bag's scanner and odometry: geometry, beam times, mounting, poses at the times of its scans."""
 
 import math
-from collections import deque
+from collections import defaultdict, deque
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
@@ -117,6 +117,7 @@ def _possible(Q: Float) -> Float:
 
 FARTHEST_M = 1e4
 MAX_BEAMS = 100_000
+MOST_TRANSFORMS = 2000  # between frames; of a robot with arms, 200
 Matrix = list[list[float]]
 
 
@@ -259,7 +260,11 @@ def mounting(
     """``T_robot_laser`` and whether the laser hangs upside down; None without a way to it.
 
     transforms  (parent, child) -> geometry_msgs/Transform
+
+    Raises ``InvalidValueError`` for more than ``MOST_TRANSFORMS``.
     """
+    if len(transforms) > MOST_TRANSFORMS:
+        raise InvalidValueError(f"more than {MOST_TRANSFORMS} transforms between frames")
     chain = _chain(transforms, robot, laser)
     if chain is None:
         return None
@@ -288,15 +293,23 @@ def _is_identity(link: Any) -> bool:
 
 def _chain(transforms: Mapping[tuple[str, str], Any], robot: str, laser: str) -> list[Any] | None:
     """The transforms from robot down to laser, by breadth-first search."""
-    ways: dict[str, list[Any]] = {robot: []}
+    below = defaultdict[str, list[tuple[str, Any]]](list)
+    for (parent, child), transform in transforms.items():
+        below[parent].append((child, transform))
+    above: dict[str, tuple[str, Any]] = {}
     rim = [robot]
-    while rim:
-        here = rim.pop(0)
-        for (parent, child), transform in transforms.items():
-            if parent == here and child not in ways:
-                ways[child] = [*ways[here], transform]
+    for here in rim:
+        for child, transform in below[here]:
+            if child not in above and child != robot:
+                above[child] = here, transform
                 rim.append(child)
-    return ways.get(laser) if laser != robot else None
+    if laser not in above:
+        return None
+    chain = []
+    while laser != robot:
+        laser, transform = above[laser]
+        chain.append(transform)
+    return chain[::-1]
 
 
 def _matrix(q: Any) -> Matrix:

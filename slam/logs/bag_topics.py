@@ -12,6 +12,7 @@ from rosbags.rosbag1 import Reader as ReaderOfRos1
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
+from slam import inputs
 from slam.bounded import check_file
 from slam.errors import LogFormatError, MissingPathError, MobiliaError
 from slam.logs import unpacking
@@ -68,6 +69,7 @@ class Bag:
         for file in path.iterdir() if path.is_dir() else [path]:
             if file.exists() and not file.is_dir():
                 check_file(file)
+                inputs.note(file)
         with failing_as_ours(path):
             self._reader: Any = ReaderOfRos1(path) if self.is_ros1 else Reader(_storage(path))
         self.at = ""  # which message was read last, in the words of an error

@@ -16,6 +16,7 @@ from decimal import Decimal
 from pathlib import Path
 from typing import BinaryIO, cast
 
+from slam import inputs
 from slam.errors import LogFormatError, MissingPathError
 from slam.frames import NS_PER_S
 from slam.logs.repairs import TORN_LINE, Repairs
@@ -129,6 +130,7 @@ def words_of(path: Path, repairs: Repairs | None = None) -> Iterator[tuple[int, 
 
 
 def _open(path: Path) -> BinaryIO:
+    inputs.note(path)
     with path.open("rb") as file:
         magic = file.read(len(_XZ))
     if magic.startswith(_GZIP) or (magic and path.suffix == ".gz"):

@@ -22,7 +22,7 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
-from slam import se2
+from slam import inputs, se2
 from slam.errors import LogFormatError
 from slam.frames import NS_PER_S, Features, Float, Frame, Odometry, Stream, StreamMetadata, to_ns
 from slam.logs.text import (
@@ -141,6 +141,7 @@ def _gps_file(folder: Path) -> Path | None:
 def _load(path: Path) -> dict[str, Any]:
     from scipy.io import loadmat  # takes half a second that other logs need not pay
 
+    inputs.note(path)
     try:
         check_mat(path)
         values: dict[str, Any] = loadmat(path)

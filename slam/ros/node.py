@@ -13,12 +13,13 @@ from typing import Any, NamedTuple
 import numpy as np
 
 from slam import se2
+from slam.checked import covariance
 from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Estimate, Raster
 from slam.frames import NS_PER_S, Float, Odometry
 from slam.frontend.odometry_prior import turned
 from slam.logs import unpacking
-from slam.logs.bag import PLANAR, planar, stamp_of
+from slam.logs.bag import MOST_POSE_M, PLANAR, planar, stamp_of
 from slam.logs.bag_laser import PoseTrack, Stamped
 from slam.ros.link import Link, Topic
 from slam.ros.messages import MAP, ODOM, MapMessage, StartMessage, TransformMessage
@@ -58,9 +59,14 @@ def transform_of(message: Any, parent: str, child: str) -> StampedPose | None:
 
 
 def pose_of(message: Any) -> StampedPose:
-    """A geometry_msgs/PoseWithCovarianceStamped; all zeros as covariance state nothing."""
-    spread = np.asarray(message.pose.covariance)[PLANAR].astype(np.float64)
-    said = spread if np.isfinite(spread).all() and spread.any() else None
+    """A geometry_msgs/PoseWithCovarianceStamped; all zeros as covariance state nothing.
+
+    Raises ``InvalidValueError`` for a place or a covariance that cannot be.
+    """
+    spread = covariance("pose", "covariance", np.asarray(message.pose.covariance)[PLANAR])
+    if spread.max() > MOST_POSE_M**2:
+        raise InvalidValueError(f"pose.covariance must be at most {MOST_POSE_M**2:g} m^2")
+    said = spread if spread.any() else None
     return StampedPose(stamp_of(message, 0), planar(message.pose.pose), said)
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What somebody's stack said while a bag was recorded, as a SLAM: to be scored after the fact."""
 
+import logging
 import math
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from slam.path import OnPath, PosePath
 from slam.ros.messages import MAP, ODOM
 from slam.ros.node import StampedPose, Statements, pose_of, transform_of
 
+_log = logging.getLogger(__name__)
 APART_S = 60.0  # no stamp of the stack so near to any of the scans: its clock is another one
 
 
@@ -24,9 +26,10 @@ def read_statements(
     pose    topic of its poses in the map (PoseWithCovarianceStamped); None: transforms on /tf
     frames  names of the frames of map and odometry in those transforms
 
-    Raises ``LogFormatError`` for a bag without any.
+    What cannot be is left out, and told once. Raises ``LogFormatError`` for a bag without any.
     """
     found: dict[int, StampedPose] = {}
+    wrong: list[LogFormatError] = []
     with Bag(path) as bag:
         kinds = (INCREMENT,) if pose is not None else TRANSFORMS
         topics = [
@@ -34,11 +37,17 @@ def read_statements(
             if kind in kinds and name == (pose if pose is not None else "/tf")
         ]  # fmt: skip
         for _, _, message in bag.messages(topics):
-            with about(path, bag.at):
-                said = transform_of(message, *frames) if pose is None else pose_of(message)
+            try:
+                with about(path, bag.at):
+                    said = transform_of(message, *frames) if pose is None else pose_of(message)
+            except LogFormatError as error:
+                wrong.append(error)
+                continue
             if said is not None:
                 found[said.stamp_ns] = said
         listed = ", ".join(f"{name} ({kind})" for name, (kind, _) in sorted(bag.topics.items()))
+    if wrong:
+        _log.warning("left out of what was said: %d messages, the first: %s", len(wrong), wrong[0])
     if not found:
         what = f"{frames[0]} -> {frames[1]} on /tf" if pose is None else f"pose on {pose}"
         raise LogFormatError(path, f"no {what}; topics: {listed or 'none'}")

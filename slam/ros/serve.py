@@ -22,7 +22,7 @@ from slam.answers import asked, asked_map
 from slam.errors import MobiliaError
 from slam.frames import NS_PER_S, Frame
 from slam.logs.bag import Assembly, stamp_of
-from slam.logs.bag_laser import Laser, mounting
+from slam.logs.bag_laser import MOST_TRANSFORMS, Laser, mounting
 from slam.logs.bag_topics import Topics
 from slam.ros.link import Link, Topic, open_link
 from slam.ros.messages import MAP, ODOM, IncrementMessage, MapMessage, TransformMessage
@@ -64,7 +64,7 @@ class Served:
         for topic in _HEARD:  # scans first: what belongs to them was sent before them
             self._waiting[topic] = (self._waiting[topic] + self._taken(topic))[-MOST_WAITING:]
         for message in self._waiting[_STATIC]:
-            for link in message.transforms:
+            for link in message.transforms[: MOST_TRANSFORMS - len(self._links)]:
                 self._links[(link.header.frame_id, link.child_frame_id)] = link.transform
         if self._assembly is None:
             if not self._waiting[_SCAN] or not self._waiting[_ODOM]:

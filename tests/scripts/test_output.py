@@ -12,15 +12,17 @@ from scripts.comparison import folder as compared
 from scripts.comparison.again import run_of
 from scripts.names import run_name
 from scripts.output import (
+    READY,
     check_whole,
     locked_folder,
     put_tables,
+    result_folder,
     together,
-    whole_folder,
     write_recipe,
 )
+from scripts.whole_folder import whole_folder
 from sim.recording.dataset import PLAN
-from sim.recording.sums import SUMS
+from sim.recording.sums import SUMS, write_sums
 from slam.errors import LogFormatError, OutputError
 from slam.files import write_text
 
@@ -51,11 +53,12 @@ def test_to_overwrite_is_no_advice_for_another_result(tmp_path: Path):
         whole_folder(tmp_path / "run", overwrite=False, command="run", settings={"text": "one"}),
     ):
         pass
-    recipe.write_text("{")
-    with pytest.raises(OutputError, match="cannot be read: choose another --out") as broken:
-        make(tmp_path / "run", "one")
-    assert not any("--overwrite" in str(error.value) for error in (other, elsewhere, broken))
     make(tmp_path / "run", "two", overwrite=True)  # who asks for it gets it
+    recipe.write_text("{")
+    for overwrite in (False, True):
+        with pytest.raises(OutputError, match="cannot be read: choose another --out") as broken:
+            make(tmp_path / "run", "two", overwrite=overwrite)
+    assert not any("--overwrite" in str(error.value) for error in (other, elsewhere, broken))
 
 
 @pytest.mark.parametrize(
@@ -89,6 +92,98 @@ def test_somebody_elses_files_are_never_replaced(tmp_path: Path):
     with pytest.raises(OutputError, match="did not write"):
         make(tmp_path / "photos", "one", overwrite=True)
     assert (tmp_path / "photos" / "cat.jpg").read_text() == "cat"
+
+
+@pytest.mark.parametrize("words", ['{"name": "tiramisu"}', "[]", "{", '{"command": "run"}', "\0"])
+@pytest.mark.parametrize("vouched", [False, True])
+def test_a_recipe_of_somebody_else_is_none_of_ours(tmp_path: Path, words: str, vouched: bool):
+    theirs = tmp_path / "cake"
+    write_text(theirs / "recipe.json", words)
+    write_text(theirs / "src" / "main.c", "int main() {}")
+    if vouched:
+        write_sums(theirs)
+    before = contents(theirs)
+    for overwrite in (False, True):
+        with pytest.raises(OutputError, match=r"choose another --out"):
+            make(theirs, "one", overwrite=overwrite)
+    with pytest.raises(OutputError, match=r"choose another --out"), locked_folder(theirs, "test"):
+        raise AssertionError("it is locked")
+    assert contents(theirs) == before
+    assert [path.name for path in tmp_path.iterdir()] == ["cake"]
+
+
+def test_a_folder_that_grows_is_not_grown_by_another_command(tmp_path: Path):
+    make(tmp_path / "run", "one")
+    with (
+        pytest.raises(OutputError, match="holds what mobilia test wrote: choose another --out"),
+        locked_folder(tmp_path / "run", "compare"),
+    ):
+        raise AssertionError("it is locked")
+
+
+@pytest.mark.parametrize("swaps", [True, False])
+@pytest.mark.parametrize("doubles", [True, False])
+def test_what_is_not_ours_stays_when_a_run_is_replaced(
+    tmp_path: Path, monkeypatch, capsys, swaps: bool, doubles: bool
+):
+    if not swaps:
+        monkeypatch.setattr("slam.files.exchange", lambda one, other: False)
+    if not doubles:
+        monkeypatch.setattr("os.link", refuse)
+    run = tmp_path / "run"
+    make(run, "one")
+    theirs = {"notes.md": "mine", "src/main.c": "int main() {}", ".hidden": "mine too"}
+    for name, text in theirs.items():
+        write_text(run / name, text)
+    (run / "link").symlink_to(tmp_path)
+    (run / "empty").mkdir()
+    make(run / "within", "a result in the result")
+    make(run, "two", overwrite=True)
+    within = {f"within/{name}": text for name, text in contents(run / "within").items()}
+    own = {name: contents(run)[name] for name in ("data.txt", "recipe.json")}
+    assert contents(run) == own | theirs | within
+    assert own["data.txt"] == "two"
+    assert (run / "within" / "data.txt").read_text() == "a result in the result"
+    assert (run / "link").readlink() == tmp_path
+    assert (run / "empty").is_dir()
+    assert [path.name for path in tmp_path.iterdir()] == ["run"]
+    told = capsys.readouterr().out
+    assert f"note: {run}: kept what mobilia did not write: .hidden, empty, link, " in told
+    assert told.count("\n") == 1
+    make(run, "three", overwrite=True)
+    assert set(contents(run)) == {*own, *theirs, *within}
+
+
+def refuse(*_words: object, **_more: object) -> None:
+    raise OSError(95, "Operation not supported")
+
+
+def test_a_file_of_theirs_under_a_name_of_ours_is_kept_under_another(tmp_path: Path, capsys):
+    run = tmp_path / "run"
+    make(run, "one")
+    for name in ("data.txt", "data.txt.old"):
+        write_text(run / name, f"my {name}")
+    (run / SUMS).write_text("".join(
+        line for line in (run / SUMS).read_text().splitlines(True) if "data" not in line
+    ))  # fmt: skip
+    make(run, "two", overwrite=True)
+    assert contents(run) == {
+        "data.txt": "two", "data.txt.old": "my data.txt", "data.txt.old.old": "my data.txt.old",
+        "recipe.json": (run / "recipe.json").read_text(),
+    }  # fmt: skip
+    assert "write: data.txt.old, data.txt.old.old" in capsys.readouterr().out
+
+
+@pytest.mark.parametrize("list_", [None, "", "0" * 64 + "  ../x\n", "no list"])
+def test_a_result_without_its_list_is_not_replaced(tmp_path: Path, list_: str | None):
+    make(tmp_path / "run", "one")
+    (tmp_path / "run" / SUMS).unlink()
+    if list_ is not None:
+        (tmp_path / "run" / SUMS).write_text(list_)
+    before = contents(tmp_path / "run")
+    with pytest.raises(OutputError, match="choose another --out"):
+        make(tmp_path / "run", "two", overwrite=True)
+    assert contents(tmp_path / "run") == before
 
 
 @pytest.mark.parametrize("failure", [KeyboardInterrupt, RuntimeError])
@@ -178,10 +273,38 @@ def test_tables_stopped_on_the_way_are_refused_and_then_finished(tmp_path: Path,
     assert contents(tmp_path) == {"a.csv": "new", "runs/b.csv": "new"}
 
 
+@pytest.mark.parametrize("moved", range(4))
+def test_the_same_command_goes_on_wherever_its_tables_were_stopped(
+    tmp_path: Path, monkeypatch, moved: int
+):
+    def grown(text: str) -> None:
+        out = result_folder(tmp_path / "out", "compare", {"text": text})
+        with out as tables, tables() as staged:
+            for name in ("a.csv", "runs/b.csv"):
+                write_text(staged / name, text)
+
+    def cut(one, two):
+        if Path(one).is_relative_to(tmp_path / "out" / READY):
+            done.append(one)
+            if len(done) > moved:
+                raise KeyboardInterrupt
+        replace(one, two)
+
+    done, replace = list[Path](), os.replace
+    grown("old")
+    monkeypatch.setattr("os.replace", cut)
+    with pytest.raises(KeyboardInterrupt):
+        grown("new")
+    monkeypatch.undo()
+    grown("new")
+    assert set(contents(tmp_path / "out")) == {"a.csv", "runs/b.csv", "recipe.json"}
+    assert contents(tmp_path / "out")["a.csv"] == "new"
+
+
 @pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()])
 def test_a_failure_leaves_no_lock(tmp_path: Path, failure: BaseException):
     def failing(out: Path) -> None:
-        with locked_folder(out):
+        with locked_folder(out, "test"):
             raise failure
 
     with pytest.raises((OutputError, KeyboardInterrupt)) as caught:
@@ -192,7 +315,10 @@ def test_a_failure_leaves_no_lock(tmp_path: Path, failure: BaseException):
         assert str(caught.value) == said
     (tmp_path / "out").mkdir()
     (tmp_path / "out" / ".recipe.17.part.json").write_text("left by a cut")
-    with locked_folder(tmp_path / "out"), pytest.raises(OutputError, match="another process"):
+    with (
+        locked_folder(tmp_path / "out", "test"),
+        pytest.raises(OutputError, match="another process"),
+    ):
         failing(tmp_path / "out")
 
 

@@ -2,6 +2,7 @@
 """The compile cache notices a change in a kernel of another module; compiling is said once."""
 
 import gc
+import hashlib
 import logging
 import os
 import pickle
@@ -15,6 +16,7 @@ import pytest
 from numba.core import event
 
 from slam._jit import COMPILING, announced, inner, uncounted
+from tests.processes import python
 
 CALLEE = """
 from slam._jit import {} as jit
@@ -97,8 +99,81 @@ def test_a_cache_that_names_types_which_are_gone_is_an_empty_cache(tmp_path):
     assert len(indices) == 1
     with indices[0].open("rb") as file:
         version = pickle.load(file)
-    indices[0].write_bytes(pickle.dumps(version) + b"cslam.errors\nGone\n.")
+    gone = pickle.dumps(version) + b"cslam.errors\nGone\n."
+    indices[0].write_bytes(gone + hashlib.sha256(gone).digest())
     assert run(tmp_path, "njit", 1.0) == 2.0
+
+
+DAMAGED = """
+import os
+import sys
+from pathlib import Path
+
+import numpy as np
+
+from slam._jit import njit
+
+cache = Path(os.environ["NUMBA_CACHE_DIR"])
+
+
+def called():
+    @njit
+    def step(x):
+        return x + 1.0
+
+    assert step(1.0) == 2.0
+    return step.stats
+
+
+def files():
+    return {file: file.read_bytes() for file in sorted(cache.rglob("*.nb[ci]"))}
+
+
+# -- the cache and its damages
+assert sum(called().cache_misses.values()) == 1
+whole = files()
+assert len(whole) == 2
+assert sum(called().cache_hits.values()) == 1
+rng = np.random.default_rng(int(sys.argv[1]))
+for k in range(110):
+    path = list(whole)[k % 2]
+    data = bytearray(whole[path])
+    kind = ("empty", "cut", "flip", "flip", "zeros", "gone")[int(rng.integers(6))]
+    at = int(rng.integers(len(data)))
+    if kind == "flip":
+        data[at] ^= 1 << int(rng.integers(8))
+    elif kind == "zeros":  # as a disk gives back what it never wrote
+        data[at:] = bytes(len(data) - at)
+    else:
+        del data[0 if kind == "empty" else at :]
+    path.write_bytes(data)
+    if kind == "gone":
+        path.unlink()
+    damaged = kind == "gone" or data != whole[path]
+    assert sum(called().cache_misses.values()) == damaged, (kind, path, at)
+    assert sum(called().cache_hits.values()) == 1, (kind, path, at)
+print("survived")
+"""
+
+
+@pytest.mark.parametrize("seed", [0, 1])
+def test_a_damaged_entry_of_the_cache_is_made_again(tmp_path, seed):
+    """A torn file of a power cut, a flipped bit: the code in it would end the process."""
+    (tmp_path / "damaged.py").write_text(DAMAGED)
+    done = python(tmp_path / "damaged.py", seed, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert (done.returncode, done.stdout, done.stderr) == (0, "survived\n", "")
+
+
+def test_a_cache_that_cannot_be_written_any_more_is_done_without(tmp_path):
+    """Its disk is full, or somebody made something else of its files."""
+    script = DAMAGED.partition("# --")[0] + (
+        "called()\n"
+        "for file in files():\n    file.unlink()\n    (file / 'full').mkdir(parents=True)\n"
+        "assert sum(called().cache_misses.values()) == 1\nprint('done')"
+    )
+    (tmp_path / "full.py").write_text(script)
+    done = python(tmp_path / "full.py", NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    assert (done.returncode, done.stdout, done.stderr) == (0, "done\n", "")
 
 
 def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptureFixture) -> None:

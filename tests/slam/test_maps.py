@@ -4,6 +4,7 @@
 import hashlib
 import os
 import zlib
+from contextlib import suppress
 
 import cv2
 import numpy as np
@@ -85,6 +86,25 @@ def test_maps_of_other_writers(tmp_path):
 def without_sums(yaml):
     """The file as other writers make it."""
     yaml.write_text(yaml.read_text().split("\n", 2)[2])
+
+
+def test_a_damaged_line_of_sums_is_told_and_not_taken_for_none(tmp_path):
+    """Each byte of the two lines flipped, cut out and made a blank; each line cut out."""
+    _, yaml = maps.write_map(tmp_path / "map", small_map())
+    whole = yaml.read_bytes()
+    first = whole.index(b"\n") + 1
+    end = whole.index(b"\n", first) + 1
+    damaged = [whole[first:], whole[:first] + whole[end:]]
+    for k in range(end):
+        for instead in (bytes([whole[k] ^ 1 << k % 8]), b"", b" "):
+            damaged.append(whole[:k] + instead + whole[k + 1 :])
+    for data in damaged:
+        yaml.write_bytes(data)
+        if data != whole:
+            with pytest.raises(LogFormatError, match=r"written|not a text file"):
+                maps.read_map(yaml)
+            with suppress(LogFormatError):
+                assert maps.has_sums(yaml)
 
 
 def test_every_flipped_byte_and_every_cut_is_noticed_or_changes_nothing(tmp_path):

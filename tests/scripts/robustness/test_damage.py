@@ -13,9 +13,10 @@ import typer
 
 from scripts import results
 from scripts.film.footage import open_run
-from scripts.output import locked_folder, together, whole_folder, write_recipe
+from scripts.output import locked_folder, together, write_recipe
 from scripts.report.page import REPORT
 from scripts.verbs.verify import verify
+from scripts.whole_folder import whole_folder
 from sim.recording.dataset import Plan, read_plan, writing
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe
@@ -274,7 +275,7 @@ def test_a_flipped_recording_and_a_torn_entry_are_made_again(comparison, tmp_pat
 
 def test_a_folder_that_grows_is_vouched_for_when_its_tables_are_in_place(tmp_path):
     out = tmp_path / "out"
-    with locked_folder(out):
+    with locked_folder(out, "compare"):
         write_recipe(out, "compare", {})
         assert "incomplete" in verdicts(out)
         (out / "kept.npz").write_bytes(b"a job's result")
@@ -282,7 +283,7 @@ def test_a_folder_that_grows_is_vouched_for_when_its_tables_are_in_place(tmp_pat
             write_recipe(staged, "compare", {"more": 1})
     assert set(read_sums(out)) == {RECIPE, "kept.npz"}
     before = (out / SUMS).read_bytes()
-    with pytest.raises(TypeError), locked_folder(out), together(out) as staged:
+    with pytest.raises(TypeError), locked_folder(out, "compare"), together(out) as staged:
         write_recipe(staged, "compare", {"more": object()})
     assert (out / SUMS).read_bytes() == before  # and all that it lists is as it was
     assert check_vouched(out / RECIPE) is None
@@ -310,6 +311,33 @@ def test_a_file_that_is_vouched_for_is_read_only_as_it_was(tmp_path):
         check_vouched(recipe)
     add_to_sums(recipe)
     check_vouched(recipe)
+
+
+def test_a_damaged_list_does_not_let_a_changed_file_pass(tmp_path):
+    """A line with another name is of no file, and its own file has no line: that is no leave."""
+    with whole_folder(tmp_path / "run", overwrite=False) as part:
+        for name in ("a.csv", "recipf.txt", "z.npz"):
+            (part / name).write_text(name)
+        write_recipe(part, "run", {"seed": 0})
+    recipe, sums = tmp_path / "run" / RECIPE, tmp_path / "run" / SUMS
+    recipe.write_text(recipe.read_text().replace("0", "1"))
+    rng, whole = np.random.default_rng(7), sums.read_bytes()
+    line = whole.index(b"recipe.json") - 66
+    for k in range(300):
+        data = bytearray(whole)
+        at = int(rng.integers(line, line + 78)) if k % 2 else int(rng.integers(len(data)))
+        data[at] ^= 1 << int(rng.integers(8))
+        if k % 3 == 0:
+            del data[at]
+        sums.write_bytes(data)
+        with pytest.raises(LogFormatError, match=r"damaged|no hash|not a text"):
+            check_vouched(recipe)
+    sums.write_bytes(whole.replace(b"recipe.json", b"recipe.jsoo"))
+    with pytest.raises(LogFormatError, match=r"lists recipe.jsoo, which is not there, and not rec"):
+        check_vouched(recipe)
+    sums.write_bytes(whole)
+    (tmp_path / "run" / "mine.txt").write_text("mine")
+    check_vouched(tmp_path / "run" / "mine.txt")  # nobody lists it, and nothing is lost
 
 
 def test_one_episode_is_checked_and_made_again_by_any_name(copied, monkeypatch, capsys):

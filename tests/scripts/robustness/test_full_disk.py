@@ -14,7 +14,9 @@ from scripts.comparison import make
 from scripts.comparison.plan import Plan
 from scripts.console import console
 from scripts.film.encode import film
-from scripts.output import whole_folder, write_recipe
+from scripts.output import write_recipe
+from scripts.whole_folder import whole_folder
+from sim.recording.sums import write_sums
 from slam.errors import OutputError
 from slam.files import write_bytes
 from slam.maps import read_map, write_map
@@ -77,12 +79,14 @@ def test_a_film(disk: Disk):
         filmed(place / "film.mp4", 60)
     assert str(caught.value) == f"cannot write {place / 'film.mp4'}: {FULL} (ffmpeg stopped)"
     assert tree(place) == {}
-    write_bytes(place / "run" / "recipe.json", b"{}")
+    write_recipe(place / "run", "test", {})
+    write_sums(place / "run")
+    before = tree(place)
     with pytest.raises(OutputError) as caught:
         run_folder(place / "run")
     said = f"cannot write {place / 'run' / 'film.mp4'}: {FULL} (ffmpeg stopped)"
     assert str(caught.value) == said
-    assert tree(place) == {"run": None, "run/recipe.json": b"{}"}
+    assert tree(place) == before
 
 
 @pytest.mark.parametrize("pictures", [1, 60])

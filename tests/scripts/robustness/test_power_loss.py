@@ -11,7 +11,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.output import whole_folder, write_recipe
+from scripts.output import write_recipe
+from scripts.whole_folder import whole_folder
 from slam import files
 from slam.maps import write_map
 from slam.shunting import ShuntingSlam

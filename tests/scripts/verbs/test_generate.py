@@ -9,7 +9,8 @@ import subprocess
 import sys
 import threading
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
+from contextlib import contextmanager
 from pathlib import Path
 
 import numpy as np
@@ -314,9 +315,11 @@ def kill_in_mid_episode(worker: subprocess.Popen[bytes], out: Path) -> None:
     worker.kill()
 
 
-def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_path):
+@contextmanager
+def dask_cluster(folder: Path) -> Iterator[tuple[str, list[subprocess.Popen[bytes]]]]:
+    """The address of a scheduler; its process, and those of two workers."""
     distributed = pytest.importorskip("distributed")
-    told = tmp_path / "scheduler.json"
+    told = folder / "scheduler.json"
     quiet = {"stdout": subprocess.DEVNULL, "stderr": subprocess.DEVNULL}
 
     def start(part: str, *options: object) -> subprocess.Popen[bytes]:
@@ -324,21 +327,49 @@ def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_pat
         words += ["--host", "127.0.0.1", "--no-dashboard", *options]
         return subprocess.Popen([str(w) for w in words], cwd=REPO, env=environment(), **quiet)
 
-    worker = ("--nthreads", 1, "--no-nanny", "--local-directory", tmp_path)
+    worker = ("--nthreads", 1, "--no-nanny", "--local-directory", folder)
     parts = [start("scheduler", "--port", 0), start("worker", *worker), start("worker", *worker)]
-    out = tmp_path / "data"
     try:
         wait_for(lambda: told.exists() and told.read_text().endswith("}"))
         address = json.loads(told.read_text())["address"]
         with distributed.Client(address) as client:
             client.wait_for_workers(2, timeout=60)
+        yield address, parts
+    finally:
+        for part in reversed(parts):
+            part.terminate()
+            part.wait(timeout=20)
+
+
+def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_path):
+    out = tmp_path / "data"
+    with dask_cluster(tmp_path) as (address, parts):
         killer = threading.Thread(target=kill_in_mid_episode, args=(parts[1], out))
         killer.start()
         generate(["arena"], out, **SETTINGS, cluster=address)
         killer.join()
         assert parts[1].poll() == -signal.SIGKILL
-    finally:
-        for part in reversed(parts):
-            part.terminate()
-            part.wait(timeout=20)
     assert (out / SUMS).read_bytes() == (serial / SUMS).read_bytes()
+
+
+@pytest.mark.parametrize("verb", ["generate", "compare"])
+def test_a_scheduler_of_dask_that_dies_is_one_line_and_the_command_goes_on(tmp_path, verb):
+    words = {
+        "generate": "generate arena --seconds 20 --episodes 6",
+        "compare": "compare --slam odometry --scene arena --dynamism 0.5 --seeds 6 --seconds 20",
+    }[verb]
+    command = [sys.executable, "-m", "scripts", *words.split(), "--out", str(tmp_path / "out")]
+    with dask_cluster(tmp_path) as (address, parts):
+        begun = subprocess.Popen(
+            [*command, "--cluster", address], cwd=REPO, env=environment(), text=True,
+            stdout=subprocess.PIPE, stderr=subprocess.PIPE,
+        )  # fmt: skip
+        wait_for(lambda: list((tmp_path / "out").glob(f"**/.*.{parts[1].pid}.part*")))
+        parts[0].kill()
+        printed, said = begun.communicate(timeout=60)
+        assert begun.returncode == 1
+        assert said.count("\n") == 1
+        assert "has gone; with another one, the same command again goes on from here" in said
+        assert "Traceback" not in printed
+    done = subprocess.run(command, cwd=REPO, env=environment(), capture_output=True, text=True)
+    assert done.returncode == 0, done.stderr

@@ -11,7 +11,8 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from sim.moments import Moment
 from sim.recording.bag import VERSION, BagWriter
-from slam.ros.messages import MAP, ODOM, TransformMessage
+from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
+from slam.ros.recorded import read_statements
 from slam.ros.template import EPOCH_NS, STORE
 from tests.slam.ros.frames import SPEC, driven
 
@@ -71,6 +72,19 @@ def test_a_bag_without_statements_lists_its_topics(called, ours, tmp_path):
     ended = called("score", ours, "--pose", "/amcl_pose", "--out", tmp_path / "out")
     assert ended.returncode == 1
     assert "no pose on /amcl_pose" in ended.stdout + ended.stderr
+
+
+def test_poses_that_cannot_be_are_left_out_and_told_once(ours, tmp_path, caplog):
+    say, spread = IncrementMessage(MAP), np.diag([0.01, 0.02, 0.03])
+    with Writer(tmp_path / "b", version=VERSION, storage_plugin=StoragePlugin.MCAP) as bag:
+        connection = bag.add_connection("/amcl_pose", say.KIND, typestore=STORE)
+        for k, frame in enumerate(FRAMES):
+            data = bytes(say(frame.stamp_ns, np.zeros(3), -spread if k % 3 == 0 else spread))
+            bag.write(connection, frame.stamp_ns + EPOCH_NS, data)
+    found = read_statements(tmp_path / "b", pose="/amcl_pose")
+    assert len(found) == 40
+    assert "left out of what was said: 20 messages, the first: " in caplog.text
+    assert "topic /amcl_pose, message 1: pose.covariance must be symmetric" in caplog.text
 
 
 def test_without_truth_what_can_be_said_is_said(called, tmp_path):

@@ -2,7 +2,9 @@
 """A recorded episode is what was seen live, for our reader and for those of others."""
 
 import math
+import struct
 import tracemalloc
+import zlib
 from collections import defaultdict
 from dataclasses import replace
 from pathlib import Path
@@ -11,6 +13,8 @@ from typing import Any
 import numpy as np
 import pytest
 from mcap.reader import make_reader
+from mcap.records import Chunk, DataEnd, Footer
+from mcap.stream_reader import StreamReader
 from mcap_ros2.decoder import DecoderFactory
 
 from scenes.kinds import kind_of
@@ -39,6 +43,39 @@ def decoded(recorded) -> dict[str, list[Any]]:
         for schema, channel, message, ros in reader.iter_decoded_messages():
             out[channel.topic].append((schema.name, message.log_time, ros))
     return out
+
+
+def checked(path: Path) -> None:
+    """Every CRC of the file by those who read it; the summary's, which they leave, by the spec."""
+    with path.open("rb") as file:
+        list(StreamReader(file, validate_crcs=True).records)
+    data = path.read_bytes()
+    start, _, crc = struct.unpack("<QQI", data[-28:-8])  # the footer, then eight bytes of magic
+    if zlib.crc32(data[start:-12]) != crc:
+        raise ValueError("of the summary")
+
+
+def test_every_crc_is_there_and_right(recorded):
+    path = next(recorded.path.glob("*.mcap"))
+    checked(path)
+    with path.open("rb") as file:
+        records = list(StreamReader(file, emit_chunks=True).records)
+    crcs = [r.uncompressed_crc for r in records if isinstance(r, Chunk)]
+    crcs += [r.data_section_crc for r in records if isinstance(r, DataEnd)]
+    crcs += [r.summary_crc for r in records if isinstance(r, Footer)]
+    assert len(crcs) == len(set(crcs)) >= 4
+    assert 0 not in crcs
+
+
+def test_a_flipped_bit_anywhere_is_noticed_by_a_crc(recorded, tmp_path):
+    data, rng = next(recorded.path.glob("*.mcap")).read_bytes(), np.random.default_rng(0)
+    ends = [0, *range(len(data) - 60, len(data))]  # of the file and its summary, bit by bit
+    for at in [*rng.integers(len(data), size=150), *ends]:
+        broken = bytearray(data)
+        broken[at] ^= 1 << int(rng.integers(8))
+        (tmp_path / "a.mcap").write_bytes(broken)
+        with pytest.raises(Exception):  # noqa: B017 (whatever it makes the parser do)
+            checked(tmp_path / "a.mcap")
 
 
 def in_a_bag(frame: Frame) -> Frame:

@@ -3,6 +3,7 @@
 
 import logging
 import math
+import time
 from pathlib import Path
 from typing import Any
 
@@ -14,7 +15,7 @@ from slam import create, se2
 from slam.errors import LogFormatError
 from slam.frames import Frame
 from slam.logs import open_log, read_bag
-from slam.logs.bag_laser import Stamped, increment_covariance
+from slam.logs.bag_laser import Stamped, increment_covariance, mounting
 
 START, MS = bags.START_NS, 1_000_000
 RANGES = [1.0, 2.0, 3.0, 4.0, 5.0]
@@ -213,6 +214,43 @@ def test_a_covariance_that_does_not_accumulate_says_nothing():
     mended = increment_covariance(Stamped(0, here, None, P), Stamped(1, here, None, P + odd))
     assert np.linalg.eigvalsh(mended).min() >= 0.0
     np.testing.assert_allclose(np.diagonal(mended), 0.01)
+
+
+@pytest.mark.parametrize("scans_first", [True, False])
+@pytest.mark.parametrize("a_message", [1, 30_000])
+def test_a_chain_of_many_transforms_is_refused_by_their_number(tmp_path, a_message, scans_first):
+    make, links = bags.Maker(), []
+    for k in range(30_000):
+        topic, kind, ns, message = make.transform(
+            START, f"f{k}", f"f{k + 1}", (0.0, 0.0, 0.0), FLAT
+        )
+        links.append((topic, kind, ns, message))
+        if a_message > 1:
+            links[0][3].transforms.append(message.transforms[0])
+    del links[30_000 // a_message :]
+    driven = drive(make)[1:]
+    path = bags.write_ros2(tmp_path / "a", driven + links if scans_first else links + driven)
+    began = time.perf_counter()
+    with pytest.raises(LogFormatError, match=r"more than 2000 transforms between frames"):
+        read_bag(path)
+    assert time.perf_counter() - began < 20.0  # it was minutes
+
+
+@pytest.mark.parametrize("n", [1, 2, 300, 1999])
+def test_a_chain_of_transforms_is_walked_from_the_robot_to_the_laser(n):
+    make, rng = bags.Maker(), np.random.default_rng(n)
+    links, wanted = {}, np.zeros(3)
+    for k in rng.permutation(n).tolist():
+        moved = (1e-3 * float(k), 0.5, 0.0)
+        message = make.transform(START, f"f{k}", f"f{k + 1}", moved, FLAT)[3]
+        links[f"f{k}", f"f{k + 1}"] = message.transforms[0].transform
+        wanted[:2] += moved[:2]
+    links["f0", "elsewhere"] = links["f0", "f1"]
+    T_robot_laser, hangs = mounting(links, "f0", f"f{n}")
+    np.testing.assert_allclose(T_robot_laser, wanted, atol=1e-9)
+    assert not hangs
+    assert mounting(links, f"f{n}", "f0") is None
+    assert mounting(links, "f0", "f0") is None
 
 
 @pytest.mark.parametrize("kind", ["sqlite3", "mcap", "ros1"])

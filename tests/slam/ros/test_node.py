@@ -102,6 +102,33 @@ def test_a_pose_is_an_answer_and_states_the_covariance(node):
     assert np.sort(np.diag(node.estimate().covariance)) == pytest.approx([0.01, 0.02, 0.03])
 
 
+@pytest.mark.parametrize(
+    "spread",
+    [
+        np.diag([-0.01, 0.02, 0.03]),
+        np.diag([0.01, 0.02, -1e-3]),
+        np.diag([np.nan, 0.02, 0.03]),
+        np.diag([0.01, np.inf, 0.03]),
+        np.diag([1e308, 0.02, 0.03]),
+        np.array([[0.01, 0.02, 0.0], [0.0, 0.02, 0.0], [0.0, 0.0, 0.03]]),
+        np.array([[0.01, 0.02, 0.0], [0.02, 0.02, 0.0], [0.0, 0.0, 0.03]]),
+        np.full((3, 3), -1.0),
+    ],
+)
+def test_a_pose_whose_covariance_cannot_be_is_counted_and_left_out(node, spread, caplog):
+    node, link = node
+    node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
+    say = IncrementMessage(MAP)
+    whole = np.diag([0.01, 0.02, 0.03])
+    for cov in (whole, spread, spread):
+        pose = say(FIRST.stamp_ns, np.array([1.0, 2.0, 0.0]), cov)
+        link.come[POSES[0].name].append(Taken(bytes(pose), "whoever"))
+    assert node.answered()
+    assert np.sort(np.diag(node.estimate().covariance)) == pytest.approx([0.01, 0.02, 0.03])
+    assert node.odd == {"malformed": 2}
+    assert caplog.text.count("/pose: left out: pose.covariance must be") == 1
+
+
 def test_its_map_comes_back(node):
     node, link = node
     node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
