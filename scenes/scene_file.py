@@ -11,18 +11,18 @@ import msgspec
 from msgspec import Meta
 
 from scenes import is_file
+from scenes.elements import Metres, Size
 from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
+from scenes.plan_file import MOST_BOXES
 from scenes.recipe import Count
 from scenes.scene import Pose
-from slam.bounded import bytes_of, text_of
+from slam.bounded import beside, bytes_of, text_of
 from slam.errors import InvalidValueError
 from slam.shaped import Table, one_of, shaped
 
 MAX_BYTES, MAX_PLAN_BYTES = 1 << 22, 1 << 26
 _Many = Meta(max_length=5000)  # walls, things, doors or pieces of furniture
-Metres = Annotated[float, Meta(ge=-1e4, le=1e4)]
-Size = Annotated[float, Meta(gt=0.0, le=1e4)]
 Point = tuple[Metres, Metres]
 At = tuple[Metres, Metres, Metres]  # m, m, degrees
 Line = Annotated[tuple[Point, ...], Meta(min_length=2, max_length=5000)]
@@ -79,7 +79,7 @@ class SceneFile(Wanted, frozen=True, kw_only=True):
     @property
     def plan_path(self) -> Path:
         """Of the MJCF file, which lies beside this one."""
-        return Path(self.path).parent / self.plan
+        return beside(Path(self.path), self.plan)
 
     @property
     def pieces(self) -> list[tuple[str, Pose]]:
@@ -100,7 +100,7 @@ def tables(path: Path) -> dict[str, Any]:
     """The keys of a TOML file; ``InvalidValueError`` names the file and what is wrong."""
     try:
         found = tomllib.loads(text_of(path, MAX_BYTES))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # a number of too many digits, too
         raise InvalidValueError(f"{path}: no TOML: {error}") from error
     for key in found:
         if key not in KEYS:
@@ -130,7 +130,12 @@ def read(path: Path) -> SceneFile:
 
 
 def _check(file: SceneFile) -> None:
-    """Raise ``InvalidValueError`` for an unknown kind, and a room that is none."""
+    """Raise ``InvalidValueError`` for an unknown kind, a room that is none, too many boxes."""
+    boxes = {"walls": sum(len(line) - 1 for line in file.walls),
+             "things": sum(len(thing.boxes) for thing in file.things)}  # fmt: skip
+    for key, n in boxes.items():
+        if n > MOST_BOXES:
+            raise InvalidValueError(f"{key} must be at most {MOST_BOXES} boxes, got {n}")
     for k, (a, b, c, d) in enumerate(file.rooms):
         if not (a < c and b < d):
             got = (a, b, c, d)
@@ -146,7 +151,7 @@ def files(path: Path) -> tuple[Path, ...]:
     """A scene's file, and those beside it that it names: its plan and its robot."""
     own = tables(path) if path.suffix == ".toml" else {}
     named = [name for name in (own.get("plan"), own.get("robot")) if isinstance(name, str)]
-    return path, *(path.parent / name for name in named if is_file(name))
+    return path, *(beside(path, name) for name in named if is_file(name))
 
 
 def sha256_of(scene: str) -> str | None:

@@ -26,7 +26,7 @@ from sim.world import hands
 from sim.world.populated import VISITOR
 from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
 from sim.world.world import World
-from slam.bounded import toml_of
+from slam.bounded import beside, toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.frames import NS_PER_S
 
@@ -86,7 +86,7 @@ def of_file(scene: object, sha256: str | None = None) -> dict[str, Any]:
     own = tables(Path(scene))
     found = {new: own[key] for key, new in (("event", "events"), ("robot", "robot")) if key in own}
     if isinstance(own.get("robot"), str) and own["robot"].endswith(".toml"):
-        found["robot"] = str(Path(scene).parent / own["robot"])
+        found["robot"] = str(beside(Path(scene), own["robot"]))
     return found
 
 
