@@ -253,13 +253,13 @@ def _rooms(
     coarse = np.where(same, middles, 0.0).astype(np.int32)
     found: dict[str, tuple[Rect, ...]] = {}
     n_rects = 0
-    for k in range(1, int(labels.max()) + 1):
-        inside = np.asarray(coarse == k)
-        if not inside.any() or n_rects >= floors.MAX_RECTS:
-            continue
-        i, j = np.nonzero(inside)
+    for cells in _by_label(coarse):
+        if n_rects >= floors.MAX_RECTS:
+            break
+        i, j = np.divmod(cells, columns)
         i0, j0 = int(i.min()), int(j.min())
-        own = inside[i0 : int(i.max()) + 1, j0 : int(j.max()) + 1]
+        own = np.zeros((int(i.max()) + 1 - i0, int(j.max()) + 1 - j0), dtype=bool)
+        own[i - i0, j - j0] = True
         rects = floors.rectangles(own, round(floors.RECT_M / step), floors.ROOM_RECTS, 0.9)
         if not rects:
             continue
@@ -275,3 +275,12 @@ def _rooms(
             for r0, c0, r1, c1 in rects
         )
     return found
+
+
+def _by_label(labels: NDArray[np.int32]) -> list[NDArray[np.int64]]:
+    """The cells of each label above 0, in their order, as places in the flat array."""
+    cells = np.flatnonzero(labels)
+    kinds = labels.ravel()[cells]
+    order = np.argsort(kinds, kind="stable")
+    ends = np.flatnonzero(np.diff(kinds[order])) + 1
+    return np.split(cells[order], ends) if len(cells) else []

@@ -270,6 +270,7 @@ def picture() -> Picture:
     return drawn[: round(view.to_pixels(np.array([[0.0, -0.3]]))[0][1])]
 
 
+MOST_PIXELS = 50_000_000  # of a map, 350 m square at 5 cm; to refuse such a one takes 1 GB
 SWEEPS = 4000  # scans of a log, at most, by which it is known what floor is free
 
 
@@ -309,7 +310,7 @@ def made(  # noqa: PLR0913 (by keyword)
 
 def of_file(path: Path) -> Raster:
     """The map of a map_server; raises as ``slam.maps.read_map``."""
-    return read_map(path, saved=True)
+    return read_map(path, saved=True, most_pixels=MOST_PIXELS)
 
 
 def of_log(path: Path, slam: str, *, strict: bool) -> tuple[Raster, NDArray[np.float64]]:
