@@ -208,6 +208,14 @@ def _stand(child: mujoco.MjSpec, pose: Pose) -> None:
         body.pos, body.quat = [x, y, body.pos[2]], quaternion(yaw)
 
 
+def length_of(geom: mujoco.MjsGeom) -> float:
+    """m, of its longer side; of what has no end, a plane, 0."""
+    if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+        return 0.0
+    ends = geom.fromto if math.isfinite(geom.fromto[0]) else (0.0,) * 6
+    return 2.0 * float(max(geom.size[:2])) + math.dist(ends[:3], ends[3:])
+
+
 def quaternion(yaw: float) -> list[float]:
     """Of a turn about the vertical."""
     return [math.cos(0.5 * yaw), 0.0, 0.0, math.sin(0.5 * yaw)]

@@ -18,9 +18,9 @@ from numpy.typing import NDArray
 from scenes.assembly import moved, part_marks, reach_of
 from scenes.from_map.survey import Cells, survey
 from scenes.kinds import KINDS
-from scenes.marks import check_span
 from scenes.placement import gap_to_boxes
 from scenes.plan import Plan, furniture
+from scenes.plan_file import check_length, check_span
 from scenes.recipe import MARGIN, START_RADIUS, Draws, finish, furnished
 from scenes.scene import Pose, Scene
 from scenes.scene_file import SceneFile, Thing, Wanted, pose_of, read
@@ -164,6 +164,7 @@ def _drawn(file: SceneFile) -> Plan:
     points = np.array([point for line in file.walls for point in line])
     low, high = points.min(axis=0) - RIM_M, points.max(axis=0) + RIM_M
     check_span(file.path, (*low.tolist(), *high.tolist()))
+    check_length(file.path, (2.0 * box[2] for box in boxes))
     shape = np.ceil((high - low) / CELL_M).astype(int)[::-1]
     cells = Cells(tuple(shape.tolist()), CELL_M, np.array([*low, 0.0]))
     corner = [*low, 0.0, 0.0, 0.0]

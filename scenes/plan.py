@@ -21,6 +21,7 @@ from scenes.assembly import (
     Assembly,
     check_materials,
     file_of,
+    length_of,
     moved,
     ours,
     parsed,
@@ -28,7 +29,8 @@ from scenes.assembly import (
     quaternion,
 )
 from scenes.kinds import KINDS, PUSHED
-from scenes.marks import Mark, check_marks, check_span, check_written, marks, yaw_of
+from scenes.marks import Mark, check_marks, check_written, marks, yaw_of
+from scenes.plan_file import check_length, check_span
 from scenes.scene import Pose, compiled
 from slam.errors import InvalidValueError
 
@@ -259,9 +261,11 @@ class Plan:
 
         Raises ``InvalidValueError`` for marks and materials that there are not, and rooms too wide.
         """
+        what = f"plan '{self._source}'"
         check_marks(self._source, self.marks, {*furniture(), *self._kinds})
-        check_span(f"plan '{self._source}'", _around([*self.find("bounds"), *self.find("room")]))
-        check_materials(self.spec, self.spec.geoms, f"plan '{self._source}'")
+        check_length(what, map(length_of, self.spec.geoms))
+        check_span(what, _around([*self.find("bounds"), *self.find("room")]))
+        check_materials(self.spec, self.spec.geoms, what)
         if self._file:  # what MuJoCo refuses of it is told with its line
             compiled(self.spec.copy(), self._file)
         self._parts.into(self.spec)

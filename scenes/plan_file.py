@@ -7,6 +7,7 @@ bounds, no entity and no other file.
 
 import re
 from collections import Counter
+from collections.abc import Iterable
 from functools import cache
 from pathlib import Path
 from xml.parsers import expat
@@ -25,6 +26,8 @@ LEAST_M = 1e-6  # m, of a size: the squares of much smaller ones are 0
 MOST_BOXES = 10_000  # walls and other geoms of a plan; to build them takes 3 s
 MOST_MARKS = 2000  # of a plan; to take them out again takes 3 s
 MOST = 500  # elements of any other kind
+MAX_M2 = 60_000.0  # m2 that a scene spans: its true map then has 150 million cells (0.6 GB)
+MOST_M = 20_000.0  # m of walls and geoms, each as long as its longer side: what maps of it cost
 _MOST = {"geom": MOST_BOXES, "site": MOST_MARKS}
 _WHOLE = re.compile(r"[-+]?[0-9]{1,9}")
 _NUMBER = re.compile(r"[-+]?(?:[0-9]+\.?[0-9]*|\.[0-9]+)(?:[eE][-+]?[0-9]+)?")
@@ -44,6 +47,24 @@ def checked(path: Path, folder: str, shared: tuple[str, ...]) -> str:
         raise InvalidValueError(f"{path}: no MJCF: {error}") from None
     except InvalidValueError as error:
         raise InvalidValueError(f"{path}:{border.line}: {error}") from None
+
+
+def check_span(what: str, bounds: tuple[float, float, float, float]) -> None:
+    """Raise ``InvalidValueError`` for a scene (xmin, ymin, xmax, ymax m) too wide for a map."""
+    xmin, ymin, xmax, ymax = bounds
+    if (xmax - xmin) * (ymax - ymin) > MAX_M2:
+        raise InvalidValueError(
+            f"{what} spans {xmax - xmin:.0f} x {ymax - ymin:.0f} m, expected at most {MAX_M2:g} m2"
+        )
+
+
+def check_length(what: str, lengths: Iterable[float]) -> None:
+    """Raise ``InvalidValueError`` for a scene with more walls (m each) than maps are made of."""
+    length = sum(lengths)
+    if length > MOST_M:
+        raise InvalidValueError(
+            f"{what} has {length:.0f} m of walls and geoms, expected at most {MOST_M:g} m"
+        )
 
 
 class _Border:

@@ -12,8 +12,8 @@ from scenes.from_map.floor import Passage, Point, Rect
 from scenes.from_map.survey import Cells, Survey, survey
 from scenes.from_map.things import Thing, things_of
 from scenes.from_map.walls import MAX_WALL_M, MOST_WALLS, boxes_of, skin
-from scenes.marks import check_span
 from scenes.placement import gap_to_boxes
+from scenes.plan_file import check_span
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.estimate import Raster

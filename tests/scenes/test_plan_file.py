@@ -137,6 +137,7 @@ def test_what_a_plan_may_not_hold_is_told_with_its_line(case: str, plan):
         ('size="3 2 0.01"', 'size="3 0 0.01"', "two half sizes > 0 m"),
         ('size="3 2 0.01"', 'size="300 200 0.01"', "spans 600 x 400 m, expected at most 60000 m2"),
         ("</mujoco>", "", "no MJCF: no element found"),
+        ("<site", '<site name="bounds:a" type="box" size="1 1 1"/><site', "is in no bounds"),
     ],
 )
 def test_what_cannot_be_built_is_told_in_one_line(was: str, is_: str, says: str, plan):
@@ -152,6 +153,9 @@ def test_too_many_of_anything_are_told_before_they_are_built(plan):
         many = "\n".join(f'<{one} name="x{k}"/>' for k in range(most + 1))
         with pytest.raises(InvalidValueError, match=f"expected at most {most} of these"):
             scenes.build(plan(SHED.replace("</worldbody>", many + "</worldbody>")))
+    long = "\n".join(f'<geom size="9 9 9" name="x{k}" type="box"/>' for k in range(1200))
+    with pytest.raises(InvalidValueError, match="m of walls and geoms, expected at most 20000 m"):
+        scenes.build(plan(SHED.replace("</worldbody>", long + "</worldbody>")))
     desks = "".join(f'<site name="desk:{k}"/>' for k in range(1100))
     with pytest.raises(InvalidValueError, match="at most 1000 pieces of furniture"):
         scenes.build(plan(SHED.replace("</worldbody>", desks + "</worldbody>")))
