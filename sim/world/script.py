@@ -25,6 +25,7 @@ from sim.core.checks import FAR_M, within, word
 from sim.world import hands
 from sim.world.populated import VISITOR
 from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
+from sim.world.robots import robot_of
 from sim.world.world import World
 from slam.bounded import beside, toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
@@ -77,7 +78,8 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
 def of_file(scene: object, sha256: str | None = None) -> dict[str, Any]:
     """``events`` and ``robot`` that a scene's own TOML file holds; nothing for other scenes.
 
-    Raises ``LogFormatError`` for a scene whose files have another hash than that.
+    Raises ``LogFormatError`` for a scene whose files have another hash than that, and for what is
+    wrong in these.
     """
     if isinstance(scene, str) and (why := changed(scene, sha256)):
         raise LogFormatError(scene, why)
@@ -87,6 +89,12 @@ def of_file(scene: object, sha256: str | None = None) -> dict[str, Any]:
     found = {new: own[key] for key, new in (("event", "events"), ("robot", "robot")) if key in own}
     if isinstance(own.get("robot"), str) and own["robot"].endswith(".toml"):
         found["robot"] = str(beside(Path(scene), own["robot"]))
+    try:
+        cues_of(found.get("events", ()))
+        if "robot" in found:
+            robot_of(found["robot"])
+    except (InvalidValueError, UnknownNameError) as error:
+        raise LogFormatError(scene, str(error)) from error
     return found
 
 
