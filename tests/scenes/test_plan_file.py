@@ -133,7 +133,7 @@ def test_what_a_plan_may_not_hold_is_told_with_its_line(case: str, plan):
     [
         ('size="3.2 0.1 0.55"', 'size="3.2 0.1"', "size 2 must be positive.*wall:north.*line 4"),
         ("wall:south", "wall:north", "repeated name 'wall:north'.*line 5"),
-        ('class="floor"', 'class="flor"', "'flor'.*line 3"),
+        ('class="floor"', 'class="wool"', "'wool'.*line 3"),
         ('size="3 2 0.01"', 'size="3 0 0.01"', "two half sizes > 0 m"),
         ('size="3 2 0.01"', 'size="300 200 0.01"', "spans 600 x 400 m, expected at most 60000 m2"),
         ("</mujoco>", "", "no MJCF: no element found"),
