@@ -32,7 +32,7 @@ from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.frames import NS_PER_S
 
 MOST_EVENTS, MOST_BYTES = 1000, 1 << 18
-MOST_ENTER = 20  # people, of one event
+MOST_ENTER, MOST_VISITORS = 20, 400  # people, of one event and of all
 RINGS_M, ROUND = (0.9, 1.3, 1.7, 2.1, 2.5, 2.9), 16  # where people enter around a door or a goal
 _KEYS = {
     "push": {"towards_m", "heading_deg", "speed_mps"}, "open": {"for_s"}, "shut": {"for_s"},
@@ -103,6 +103,10 @@ def cues_of(rows: Sequence[Mapping[str, Any]]) -> tuple[Cue, ...]:
     if not isinstance(rows, list | tuple) or len(rows) > MOST_EVENTS:
         raise InvalidValueError(f"events must be at most {MOST_EVENTS} tables, got {rows!r:.80}")
     cues = [_cue(f"event {k + 1}", row) for k, row in enumerate(rows)]
+    if visitors(cues) > MOST_VISITORS:
+        raise InvalidValueError(
+            f"events: {visitors(cues)} people enter, expected at most {MOST_VISITORS}"
+        )
     return tuple(sorted(cues, key=lambda cue: cue.at_s))
 
 
@@ -160,13 +164,13 @@ def visitors(cues: Sequence[Cue]) -> int:
 
 
 class Script:
-    """Lets the events of a world happen.
+    """Lets the events of a world happen; ``source``: whose they are, for the errors.
 
     Raises ``UnknownNameError`` for a thing, door or goal that the world does not have, and
     ``InvalidValueError`` for a robot that would be carried into a wall.
     """
 
-    def __init__(self, cues: Sequence[Cue], world: World) -> None:
+    def __init__(self, cues: Sequence[Cue], world: World, source: str = "") -> None:
         self._cues, self.done = tuple(cues), [False] * len(cues)
         guests = [name for name in world.people.names if name.startswith(VISITOR)]
         self._guests: list[list[str]] = []
@@ -174,7 +178,8 @@ class Script:
             try:
                 _check(cue.request, world)
             except (UnknownNameError, InvalidValueError) as error:
-                raise type(error)(f"event at {cue.at_s:g} s: {error}") from error
+                where = f"{source}: event" if source else "event"
+                raise type(error)(f"{where} at {cue.at_s:g} s: {error}") from error
             n, first = visitors([cue]), visitors(cues[:k])
             self._guests.append(guests[first : first + n])
 

@@ -183,6 +183,23 @@ def test_a_robot_from_elsewhere_is_refused(lab, name):
         Simulation(lab(BOX + f'robot = "{name}"'))
 
 
+ENTER = "[[event]]\nat_s = 1\nenter = 20\nby = [{}, 3]\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (ENTER.format(3) * 30, "events: 600 people enter, expected at most 400"),
+        (ENTER.format(999), "event at 1 s: nobody finds room to enter"),
+        ("[[event]]\nat_s = nan\nenter = 1\nby = [3, 3]\n", "event 1: at_s must be a number"),
+        ('robot = "roomba"\n', "no robot is called 'roomba'"),
+    ],
+)
+def test_what_is_wrong_in_its_events_and_robot_is_told_with_the_file(lab, more, says):
+    with pytest.raises(MobiliaError, match=rf"lab\.toml: {says}"):
+        Simulation(lab(BOX + more))
+
+
 def test_things_beyond_the_most_stand(lab, monkeypatch):
     monkeypatch.setattr("scenes.from_file.MOST_MOVING", 1)
     things = "".join(
