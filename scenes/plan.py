@@ -264,7 +264,8 @@ class Plan:
         what = f"plan '{self._source}'"
         check_marks(self._source, self.marks, {*furniture(), *self._kinds})
         check_length(what, map(length_of, self.spec.geoms))
-        check_span(what, _around([*self.find("bounds"), *self.find("room")]))
+        boxes, goals = [*self.find("bounds"), *self.find("room")], len([*self.find("goal")])
+        check_span(what, _around(boxes), goals)
         check_materials(self.spec, self.spec.geoms, what)
         if self._file:  # what MuJoCo refuses of it is told with its line
             compiled(self.spec.copy(), self._file)

@@ -27,6 +27,7 @@ MOST_BOXES = 10_000  # walls and other geoms of a plan; to build them takes 3 s
 MOST_MARKS = 2000  # of a plan; to take them out again takes 3 s
 MOST = 500  # elements of any other kind
 MAX_M2 = 60_000.0  # m2 that a scene spans: its true map then has 150 million cells (0.6 GB)
+MOST_GOALS_M2 = 1.5e6  # m2 that a scene spans times its goals: the ways to them take 0.9 GB
 MOST_M = 20_000.0  # m of walls and geoms, each as long as its longer side: what maps of it cost
 _MOST = {"geom": MOST_BOXES, "site": MOST_MARKS}
 _WHOLE = re.compile(r"[-+]?[0-9]{1,9}")
@@ -49,13 +50,15 @@ def checked(path: Path, folder: str, shared: tuple[str, ...]) -> str:
         raise InvalidValueError(f"{path}:{border.line}: {error}") from None
 
 
-def check_span(what: str, bounds: tuple[float, float, float, float]) -> None:
-    """Raise ``InvalidValueError`` for a scene (xmin, ymin, xmax, ymax m) too wide for a map."""
+def check_span(what: str, bounds: tuple[float, float, float, float], goals: int = 0) -> None:
+    """Raise ``InvalidValueError`` for a scene (xmin, ymin, xmax, ymax m) too wide for its maps."""
     xmin, ymin, xmax, ymax = bounds
-    if (xmax - xmin) * (ymax - ymin) > MAX_M2:
-        raise InvalidValueError(
-            f"{what} spans {xmax - xmin:.0f} x {ymax - ymin:.0f} m, expected at most {MAX_M2:g} m2"
-        )
+    area, wide = (xmax - xmin) * (ymax - ymin), f"{xmax - xmin:.0f} x {ymax - ymin:.0f} m"
+    if area > MAX_M2:
+        raise InvalidValueError(f"{what} spans {wide}, expected at most {MAX_M2:g} m2")
+    if goals * area > MOST_GOALS_M2:
+        most = int(MOST_GOALS_M2 / area)
+        raise InvalidValueError(f"{what} has {goals} goals on {wide}, expected at most {most}")
 
 
 def check_length(what: str, lengths: Iterable[float]) -> None:

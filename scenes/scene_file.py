@@ -14,14 +14,13 @@ from scenes import is_file
 from scenes.elements import Metres, Size
 from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
-from scenes.plan_file import MOST_BOXES
+from scenes.plan_file import MAX_BYTES, MOST_BOXES
 from scenes.recipe import Count
 from scenes.scene import Pose
 from slam.bounded import beside, bytes_of, text_of
 from slam.errors import InvalidValueError
 from slam.shaped import Table, one_of, shaped
 
-MAX_BYTES, MAX_PLAN_BYTES = 1 << 22, 1 << 26
 _Many = Meta(max_length=5000)  # walls, things, doors or pieces of furniture
 Point = tuple[Metres, Metres]
 At = tuple[Metres, Metres, Metres]  # m, m, degrees
@@ -158,7 +157,7 @@ def sha256_of(scene: str) -> str | None:
     """Of all ``files`` of a scene by its file; None for another."""
     if not is_file(scene):
         return None
-    each = [hashlib.sha256(bytes_of(f, MAX_PLAN_BYTES)).digest() for f in files(Path(scene))]
+    each = [hashlib.sha256(bytes_of(f, MAX_BYTES)).digest() for f in files(Path(scene))]
     return hashlib.sha256(b"".join(each)).hexdigest()
 
 

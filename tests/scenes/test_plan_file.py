@@ -24,6 +24,11 @@ SHED = """<mujoco model="shed">
 </worldbody>
 </mujoco>
 """
+GOALS = (
+    '<site name="room:hall" type="box" size="120 120 0.1"/>'
+    + "".join(f'<site name="goal:{k}"/>' for k in range(40))
+    + "</worldbody>"
+)
 LAUGHS = '<!DOCTYPE m [<!ENTITY a "ha"><!ENTITY b "&a;&a;&a;&a;&a;&a;">]>\n'
 SIZED = ("geom_pos", "geom_size", "geom_quat", "geom_contype", "body_mass", "jnt_axis", "cam_pos")
 
@@ -137,6 +142,7 @@ def test_what_a_plan_may_not_hold_is_told_with_its_line(case: str, plan):
         ('size="3 2 0.01"', 'size="3 0 0.01"', "two half sizes > 0 m"),
         ('size="3 2 0.01"', 'size="300 200 0.01"', "spans 600 x 400 m, expected at most 60000 m2"),
         ("</mujoco>", "", "no MJCF: no element found"),
+        ("</worldbody>", GOALS, "has 40 goals on 240 x 240 m, expected at most 26"),
         ("<site", '<site name="bounds:a" type="box" size="1 1 1"/><site', "is in no bounds"),
     ],
 )
