@@ -170,7 +170,8 @@ def results() -> dict[str, dict[str, str | bytes]]:
     del words["sha256"]  # else damage is noticed by it alone
     with (folder / "map.npz").open("wb") as new:
         write_arrays(new, {**arrays, "header": np.array(json.dumps(words))})
-    submission.write(folder / "mine.json", submitted())
+    made_with = {"machine": {"processor": "an abacus", "cores": 2}}
+    submission.write(folder / "mine.json", replace(submitted(), made_with=made_with))
     plan = Plan(
         recipe=Recipe(scene="arena", seed=1, dynamism=0.5, seconds=0.1),
         dynamisms=(0.5,),
