@@ -77,8 +77,9 @@ class SceneFile(Wanted, frozen=True, kw_only=True):
 
     @property
     def plan_path(self) -> Path:
-        """Of the MJCF file, which lies beside this one."""
-        return beside(Path(self.path), self.plan)
+        """Of the MJCF file: this one, or one that lies beside it."""
+        path = Path(self.path)
+        return path if path.suffix == ".xml" else beside(path, self.plan)
 
     @property
     def pieces(self) -> list[tuple[str, Pose]]:

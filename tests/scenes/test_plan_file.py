@@ -195,6 +195,12 @@ def test_run_and_check_refuse_the_same_in_one_line(case, verb, plan, capsys, mon
     assert os.listdir(tmp_path) == ["shed.xml"]
 
 
+def test_a_link_that_is_typed_is_followed(plan, tmp_path: Path):
+    (tmp_path / "in").mkdir()
+    (tmp_path / "in" / "link.xml").symlink_to(plan(SHED))
+    assert scenes.build(str(tmp_path / "in" / "link.xml")).name == "link"
+
+
 def test_a_named_pipe_is_no_plan(tmp_path: Path):
     os.mkfifo(tmp_path / "pipe.xml")
     with pytest.raises(MobiliaError, match=r"pipe\.xml"):
