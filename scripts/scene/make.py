@@ -271,7 +271,7 @@ def picture() -> Picture:
     return drawn[: round(view.to_pixels(np.array([[0.0, -0.3]]))[0][1])]
 
 
-MOST_PIXELS = 50_000_000  # of a map, 350 m square at 5 cm; to refuse such a one takes 1 GB
+MOST_PIXELS = 36_000_000  # of a map, 300 m square at 5 cm; to refuse such a one takes 1 GB
 SWEEPS = 4000  # scans of a log, at most, by which it is known what floor is free
 
 
