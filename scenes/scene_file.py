@@ -131,6 +131,8 @@ def read(path: Path) -> SceneFile:
 
 def _check(file: SceneFile) -> None:
     """Raise ``InvalidValueError`` for an unknown kind, a room that is none, too many boxes."""
+    if not file.plan and not file.walls:
+        raise InvalidValueError("walls must be one polyline or more, or plan a file; got neither")
     boxes = {"walls": sum(len(line) - 1 for line in file.walls),
              "things": sum(len(thing.boxes) for thing in file.things)}  # fmt: skip
     for key, n in boxes.items():

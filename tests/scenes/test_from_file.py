@@ -155,6 +155,8 @@ BOX = "walls = [[[0, 0], [8, 0], [8, 5], [0, 5], [0, 0]]]\nstart = [1, 1, 0]\n"
         (f"walls = [{('[' + '[0, 0], [8, 5], ' * 2000 + '], ') * 4}]\n", "at most 10000 boxes"),
         (BOX + "put = [" + '["desk", 4, 3, 0], ' * 1100 + "]", "at most 1000 pieces of furniture"),
         (BOX + "put = [" + '["bin", 4, 3, 0], ' * 2 + "]", r"'bin1' at \(4, 3\) stands in 'bin0'"),
+        ("walls = []", "walls must be one polyline or more"),
+        ('plan = ""', "walls must be one polyline or more"),
         ('plan = "/etc/shed.xml"', "'/etc/shed.xml', expected one beside it"),
         ('plan = "../shed.xml"', "'../shed.xml', expected one beside it"),
         ('plan = "out.xml"', "'out.xml', expected one beside it"),

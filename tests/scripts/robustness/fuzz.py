@@ -119,7 +119,7 @@ class Found:
         """The summary."""
         n, c = self.counts.total(), self.counts
         return (
-            f"{n} inputs of {len(READERS)} kinds: {c['read']} read, {c['refused']} refused; "
+            f"{n} inputs: {c['read']} read, {c['refused']} refused; "
             f"{c['raw']} raw errors, {c['crash']} crashes, {c['slow']} over {LIMIT_S} s"
         )
 
