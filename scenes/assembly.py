@@ -11,20 +11,20 @@ import math
 from collections.abc import Callable, Iterable, Mapping
 from functools import cache
 from pathlib import Path
-from xml.etree import ElementTree
 
 import mujoco
 
 from scenes.kinds import KINDS, kind_of
 from scenes.marks import Mark, marks
+from scenes.plan_file import checked
 from scenes.scene import Mover, Pose
 from slam.errors import InvalidValueError
 
 HERE = Path(__file__).parent
 # What a plan and a part share with all others, by their folder; later ones build on earlier ones.
 SHARED = {"plans": ("parts/common.xml", "plans/world.xml"), "parts": ("parts/common.xml",)}
+MOST_PARTS = 1000  # put at once: what they cost grows by the square, 1000 chairs take 5 s
 LIMBS = ("thigh_l", "shank_l", "thigh_r", "shank_r")
-MAX_BYTES = 1 << 24  # of a file from elsewhere
 
 
 def file_of(folder: str, name: str) -> Path:
@@ -54,29 +54,15 @@ def parsed(folder: str, name: str) -> mujoco.MjSpec:
     includes them or not.
     """
     path = file_of(folder, name)
-    try:
-        if path.parent == HERE / folder:
-            return mujoco.MjSpec.from_file(str(path))
-        if path.stat().st_size > MAX_BYTES:
-            raise ValueError(f"it is larger than {MAX_BYTES >> 20} MB")
-        return _from_elsewhere(path, SHARED[folder])
-    except (ValueError, ElementTree.ParseError, OSError) as error:
-        words = " ".join(str(error).split())
-        raise InvalidValueError(f"{path}: no MJCF that can be used: {words}") from error
-
-
-def _from_elsewhere(path: Path, shared: tuple[str, ...]) -> mujoco.MjSpec:
-    root = ElementTree.fromstring(path.read_bytes())
-    included = {Path(element.get("file", "")).name for element in root.iter("include")}
-    missing = [HERE / name for name in shared if Path(name).name not in included]
-    if len(missing) < len(shared):  # it includes some by a path of its own
+    if path.parent == HERE / folder:
         return mujoco.MjSpec.from_file(str(path))
-    for place, file in enumerate(missing):
-        root.insert(place, ElementTree.Element("include", file=file.name))
-    texts = {file.name: file.read_bytes() for file in missing}
-    spec = mujoco.MjSpec.from_string(ElementTree.tostring(root, encoding="unicode"), include=texts)
-    spec.modelfiledir = str(path.parent.resolve())  # where its meshes and textures lie
-    return spec
+    texts = {file.name: file.read_bytes() for file in (HERE / own for own in SHARED[folder])}
+    text = checked(path, folder, tuple(texts))
+    try:
+        return mujoco.MjSpec.from_string(text, include=texts)
+    except ValueError as error:
+        words = " ".join(str(error).split())
+        raise InvalidValueError(f"{path}: no MJCF that can be used: {words}") from None
 
 
 def check_materials(spec: mujoco.MjSpec, geoms: Iterable[mujoco.MjsGeom], where: str) -> None:
@@ -155,6 +141,7 @@ class Assembly:
 
     def __init__(self) -> None:
         self._groups: dict[str, mujoco.MjSpec] = {}
+        self._count = 0
 
     def put(
         self,
@@ -163,7 +150,16 @@ class Assembly:
         pose: Pose,
         prepare: Callable[[mujoco.MjSpec], None] | None = None,
     ) -> None:
-        """Put a copy of part ``name``, altered by ``prepare``, at ``pose`` as ``instance``."""
+        """Put a copy of part ``name``, altered by ``prepare``, at ``pose`` as ``instance``.
+
+        Raises ``InvalidValueError`` from ``MOST_PARTS`` on.
+        """
+        self._count += 1
+        if self._count > MOST_PARTS:
+            raise InvalidValueError(
+                f"'{instance}' is one too many: a plan has at most {MOST_PARTS} pieces of "
+                f"furniture, and a scene as many things that move"
+            )
         child = part(name).copy()
         if prepare:
             prepare(child)
@@ -210,6 +206,14 @@ def _stand(child: mujoco.MjSpec, pose: Pose) -> None:
         body = child.body(limb)
         x, y, yaw = moved(pose, (float(body.pos[0]), float(body.pos[1]), 0.0))
         body.pos, body.quat = [x, y, body.pos[2]], quaternion(yaw)
+
+
+def length_of(geom: mujoco.MjsGeom) -> float:
+    """m, of its longer side; of what has no end, a plane, 0."""
+    if geom.type == mujoco.mjtGeom.mjGEOM_PLANE:
+        return 0.0
+    ends = geom.fromto if math.isfinite(geom.fromto[0]) else (0.0,) * 6
+    return 2.0 * float(max(geom.size[:2])) + math.dist(ends[:3], ends[3:])
 
 
 def quaternion(yaw: float) -> list[float]:

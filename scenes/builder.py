@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from scenes.assembly import Assembly, moved, part
 from scenes.plan import Plan
 from scenes.scene import Kind, Mover, Pose
+from slam.errors import InvalidValueError
 
 LEAF_HALF = 0.025  # m, half thickness of a door leaf with its trim
 TRACK = 0.11  # m from the middle of a wall to that of a leaf that slides before it
@@ -94,6 +95,18 @@ class Builder:
     def leaf_boxes(self) -> NDArray[np.float64]:
         """(n, 5) all leaves, open."""
         return np.array([self.leaf_box(name) for name in self.door_angles]).reshape(-1, 5)
+
+    def check_apart(self) -> None:
+        """Raise ``InvalidValueError`` for a thing that stands in another: both would burst."""
+        things = [mover for mover in self.movers if mover.group != "door"]
+        at = np.array([self.initial[mover.name][:2] for mover in things]).reshape(-1, 2)
+        radius = np.array([mover.radius for mover in things])
+        for k in range(1, len(things)):
+            near = np.hypot(*(at[:k] - at[k]).T) < 0.5 * (radius[:k] + radius[k])
+            if near.any():
+                x, y = at[k].tolist()
+                other = things[int(np.flatnonzero(near)[0])].name
+                raise InvalidValueError(f"'{things[k].name}' at ({x:g}, {y:g}) stands in '{other}'")
 
     def spec(self) -> mujoco.MjSpec:
         """Plan and movers in one; the builder is empty afterwards."""

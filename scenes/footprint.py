@@ -14,6 +14,7 @@ Float = NDArray[np.float64]
 GEOM = mujoco.mjtGeom
 HULL_GROUP = 3
 RESOLUTION_M = 0.02
+MAX_CELLS = 1 << 20  # that are looked at at once
 MARGIN_M = 0.3  # beyond the floor, so that the outer walls are on the map
 
 
@@ -57,15 +58,17 @@ def static_raster(
         high = np.ceil((centre[:2] + half[:2] - origin) / RESOLUTION_M).astype(int)
         rows = slice(max(low[1], 0), min(high[1], n_y))
         columns = slice(max(low[0], 0), min(high[0], n_x))
-        y, x = np.ogrid[rows, columns]
-        offset = (
-            xmin + (x + 0.5) * RESOLUTION_M - data.geom_xpos[geom, 0],
-            ymin + (y + 0.5) * RESOLUTION_M - data.geom_xpos[geom, 1],
-            height - float(data.geom_xpos[geom, 2]),
-        )
-        local = [sum(offset[i] * turn[i, axis] for i in range(3)) for axis in range(3)]
-        inside = _inside(int(model.geom_type[geom]), model.geom_size[geom], *local)
-        values[rows, columns][inside] = 1.0
+        step = max(1, MAX_CELLS // max(1, columns.stop - columns.start))
+        for first in range(rows.start, rows.stop, step):
+            y, x = np.ogrid[first : min(first + step, rows.stop), columns]
+            offset = (
+                xmin + (x + 0.5) * RESOLUTION_M - data.geom_xpos[geom, 0],
+                ymin + (y + 0.5) * RESOLUTION_M - data.geom_xpos[geom, 1],
+                height - float(data.geom_xpos[geom, 2]),
+            )
+            local = [sum(offset[i] * turn[i, axis] for i in range(3)) for axis in range(3)]
+            inside = _inside(int(model.geom_type[geom]), model.geom_size[geom], *local)
+            values[first : first + len(y), columns][inside] = 1.0
     return Raster(
         values=values, resolution_m=RESOLUTION_M, T_map_origin=np.array([xmin, ymin, 0.0])
     )

@@ -20,6 +20,7 @@ from scenes.from_map.survey import Cells, survey
 from scenes.kinds import KINDS
 from scenes.placement import gap_to_boxes
 from scenes.plan import Plan, furniture
+from scenes.plan_file import check_length, check_span
 from scenes.recipe import MARGIN, START_RADIUS, Draws, finish, furnished
 from scenes.scene import Pose, Scene
 from scenes.scene_file import SceneFile, Thing, Wanted, pose_of, read
@@ -29,7 +30,7 @@ from slam.shaped import shaped
 
 CELL_M, RIM_M = 0.05, 0.6  # cells on which the floor inside drawn walls is found, and beyond them
 BESIDE_M = 0.3  # a thing that near to a room is on its floor
-MAX_CELLS = 1 << 26
+MOST_MOVING = 800  # things; what is more stands, so that doors and people have room in the scene
 FLOOR = "floor_concrete"
 Rect5 = tuple[float, float, float, float, float]  # x, y, half sides m, yaw rad
 
@@ -54,11 +55,13 @@ def recipe(name: str) -> Callable[..., Scene]:
         }  # fmt: skip
         file = read(path)
         asked = {key: value for key, value in given.items() if value is not None}
-        return _scene(
-            file,
-            shaped("", {**{key: getattr(file, key) for key in file.given}, **asked}, Wanted),
-            seed,
-        )
+        said = {key: getattr(file, key) for key in file.given}
+        try:
+            return _scene(file, shaped("", {**said, **asked}, Wanted), seed)
+        except InvalidValueError as error:
+            if any(one in str(error) for one in (path.name, file.plan or path.name)):
+                raise
+            raise InvalidValueError(f"{path}: {error}") from None
 
     return from_file
 
@@ -113,7 +116,9 @@ def _movers(
             and b - BESIDE_M <= thing.at[1] <= d + BESIDE_M
             for a, b, c, d in (mark.rect for mark in plan.find("room"))
         )
-        room = on_floor and _has_room(thing, movers, boxes, plan.start)
+        room = (
+            on_floor and len(movers) < MOST_MOVING and _has_room(thing, movers, boxes, plan.start)
+        )
         if wanted.furniture == "move" and room:
             movers.append((thing.kind, pose_of(*thing.at)))
         else:
@@ -158,10 +163,9 @@ def _drawn(file: SceneFile) -> Plan:
             boxes.append([*middle, 0.5 * length + half, half, yaw])
     points = np.array([point for line in file.walls for point in line])
     low, high = points.min(axis=0) - RIM_M, points.max(axis=0) + RIM_M
+    check_span(file.path, (*low.tolist(), *high.tolist()))
+    check_length(file.path, (2.0 * box[2] for box in boxes))
     shape = np.ceil((high - low) / CELL_M).astype(int)[::-1]
-    if int(shape[0]) * int(shape[1]) > MAX_CELLS:
-        raise InvalidValueError(f"{file.path}: its walls span {high[0] - low[0]:.0f} x "
-                                f"{high[1] - low[1]:.0f} m, which is too far")  # fmt: skip
     cells = Cells(tuple(shape.tolist()), CELL_M, np.array([*low, 0.0]))
     corner = [*low, 0.0, 0.0, 0.0]
     local, stands = np.array(boxes) - corner, _footprints(file) - corner

@@ -34,6 +34,7 @@ WRITTEN = {
 }
 STANDS = {"seat": "chair", "spot": "load"}  # group of the kinds that stand at a mark
 NEEDED = ("room", "start")
+BOXES = ("room", "bounds")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -99,11 +100,19 @@ def check_marks(source: str, found: Sequence[Mark], parts: Collection[str]) -> N
         if word not in seen:
             raise InvalidValueError(f"plan '{source}' needs a mark '{WRITTEN[word]}'; it has none")
     x, y, _ = seen["start"].pose
-    rooms = [mark.rect for mark in found if mark.words[0] == "room"]
-    if not any(low <= x <= high and left <= y <= right for low, left, high, right in rooms):
-        raise InvalidValueError(
-            f"plan '{source}': start:robot at ({x:g}, {y:g}) is in no room; expected it inside one"
-        )
+    for word in BOXES:
+        boxes = [mark.rect for mark in found if mark.words[0] == word]
+        if boxes and not any(a <= x <= c and b <= y <= d for a, b, c, d in boxes):
+            raise InvalidValueError(
+                f"plan '{source}': start:robot at ({x:g}, {y:g}) is in no {word}; expected it "
+                "inside one"
+            )
+    for mark in found:
+        if mark.words[0] in BOXES and not min(mark.half) > 0.0:
+            raise InvalidValueError(
+                f"plan '{source}': mark '{':'.join(mark.words)}' must be a box of two half sizes "
+                f"> 0 m, got {mark.half}"
+            )
 
 
 def yaw_of(element: mujoco.MjsSite | mujoco.MjsGeom) -> float:

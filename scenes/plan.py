@@ -21,6 +21,7 @@ from scenes.assembly import (
     Assembly,
     check_materials,
     file_of,
+    length_of,
     moved,
     ours,
     parsed,
@@ -29,7 +30,8 @@ from scenes.assembly import (
 )
 from scenes.kinds import KINDS, PUSHED
 from scenes.marks import Mark, check_marks, check_written, marks, yaw_of
-from scenes.scene import Pose
+from scenes.plan_file import check_length, check_span
+from scenes.scene import Pose, compiled
 from slam.errors import InvalidValueError
 
 Bounds = tuple[float, float, float, float]
@@ -38,6 +40,7 @@ ASPECT = 16 / 9
 HEIGHT = 1.1  # m, of what is to be in the picture
 RIM_M = 0.35  # m of ground shown around the floor, outer walls included
 PITCH_DEG, FOV_DEG = 56.0, 36.0
+MAX_FOVY = 179.0  # m high is the most that MuJoCo lets a picture from above show (below 180)
 MARGIN = 1.01
 ROUNDS = 40  # of moving the camera; each halves the error at least
 
@@ -52,7 +55,7 @@ def add_cameras(spec: mujoco.MjSpec, bounds: Bounds) -> None:
             name="top", pos=[0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 14.0]
         )
         camera.proj = mujoco.mjtProjection.mjPROJ_ORTHOGRAPHIC
-        camera.fovy = max(high, wide / ASPECT)
+        camera.fovy = min(max(high, wide / ASPECT), MAX_FOVY)
     if "persp" not in known:
         pitch = math.radians(PITCH_DEG)
         camera = spec.worldbody.add_camera(name="persp", pos=_stand_back(bounds), fovy=FOV_DEG)
@@ -102,7 +105,7 @@ class Plan:
         written = file_of("plans", source).stat().st_mtime_ns
         spec, self.marks = _parsed(source, tuple(floors), written)
         self.spec = spec.copy()
-        self._source = Path(source).name
+        self._source, self._file = Path(source).name, source if source.endswith(".xml") else ""
         self.seats: list[Mark] = list(self.find("seat"))
         self.put: list[tuple[str, Pose]] = []
         self._furniture: list[list[float]] = []
@@ -127,10 +130,7 @@ class Plan:
     @property
     def bounds(self) -> tuple[float, float, float, float]:
         """xmin, ymin, xmax, ymax of all rooms, m; or of the mark ``bounds:NAME``, where one is."""
-        rects = [m.rect for m in self.find("bounds")] or [m.rect for m in self.find("room")]
-        low = [min(rect[i] for rect in rects) for i in (0, 1)]
-        high = [max(rect[i] for rect in rects) for i in (2, 3)]
-        return low[0], low[1], high[0], high[1]
+        return _around([*self.find("bounds")] or [*self.find("room")])
 
     @property
     def boxes(self) -> NDArray[np.float64]:
@@ -259,15 +259,27 @@ class Plan:
     def finish(self) -> "Plan":
         """Put the parts in, dress the walls, add cameras where none are.
 
-        Raises ``InvalidValueError`` for marks and materials that there are not.
+        Raises ``InvalidValueError`` for marks and materials that there are not, and rooms too wide.
         """
+        what = f"plan '{self._source}'"
         check_marks(self._source, self.marks, {*furniture(), *self._kinds})
-        check_materials(self.spec, self.spec.geoms, f"plan '{self._source}'")
+        check_length(what, map(length_of, self.spec.geoms))
+        boxes, goals = [*self.find("bounds"), *self.find("room")], len([*self.find("goal")])
+        check_span(what, _around(boxes), goals)
+        check_materials(self.spec, self.spec.geoms, what)
+        if self._file:  # what MuJoCo refuses of it is told with its line
+            compiled(self.spec.copy(), self._file)
         self._parts.into(self.spec)
         self._boxes = self.boxes
         look.trim_walls(self.spec)
         add_cameras(self.spec, self.bounds)
         return self
+
+
+def _around(boxes: Sequence[Mark]) -> Bounds:
+    low = [min(mark.rect[i] for mark in boxes) for i in (0, 1)]
+    high = [max(mark.rect[i] for mark in boxes) for i in (2, 3)]
+    return low[0], low[1], high[0], high[1]
 
 
 @cache

@@ -183,6 +183,7 @@ def furnished(
     hang_doors(builder, draws.doors, doors)
     put_bins(builder, draws.bins)
     put_movers(builder, plan.put)
+    builder.check_apart()
     floor = free_floor(builder)
     seat_chairs(builder, floor, plan.seats, n_chairs, draws)
     for kind, n in (loads or {}).items():

@@ -12,6 +12,7 @@ from numpy.typing import NDArray
 from scenes import SCAN_HEIGHT
 from scenes.footprint import static_raster
 from scenes.kinds import Group, joint_of_door, kind_of
+from slam.errors import InvalidValueError
 from slam.shaped import within
 from slam.system import Raster
 
@@ -129,11 +130,14 @@ class Scene:
     @cached_property
     def static_map(self) -> Raster:
         """Truth at the scan plane from what never moves: 1 occupied, 0 free."""
-        return static_raster(self.spec.compile(), self.bounds, self.scan_height_m)
+        return static_raster(self.compile(), self.bounds, self.scan_height_m)
 
     def compile(self) -> mujoco.MjModel:
-        """The model; its qpos0 is zero, as a planar qpos *is* the world pose: see ``place``."""
-        return self.spec.compile()
+        """The model; its qpos0 is zero, as a planar qpos *is* the world pose: see ``place``.
+
+        Raises ``InvalidValueError`` for what MuJoCo refuses.
+        """
+        return compiled(self.spec, f"scene '{self.name}'")
 
     def place(self, model: mujoco.MjModel, data: mujoco.MjData) -> None:
         """Write ``initial`` and ``door_angles`` into ``data.qpos`` (velocities stay untouched)."""
@@ -144,6 +148,15 @@ class Scene:
                 continue
             for joint, value in zip(("x", "y", "yaw"), self.initial[mover.name], strict=True):
                 data.qpos[_address(model, f"{mover.name}/{joint}")] = value
+
+
+def compiled(spec: mujoco.MjSpec, what: str) -> mujoco.MjModel:
+    """The model of a spec; ``InvalidValueError`` says what it is of, and why MuJoCo refuses it."""
+    try:
+        return spec.compile()
+    except (ValueError, mujoco.FatalError) as error:
+        words = " ".join(str(error).split())
+        raise InvalidValueError(f"{what}: no model that can be used: {words}") from None
 
 
 def at_scan_height(scene: Scene, scan_height_m: float) -> Scene:

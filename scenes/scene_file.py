@@ -11,18 +11,17 @@ import msgspec
 from msgspec import Meta
 
 from scenes import is_file
+from scenes.elements import Metres, Size
 from scenes.kinds import KINDS, PUSHED
 from scenes.plan import furniture
+from scenes.plan_file import MAX_BYTES, MOST_BOXES
 from scenes.recipe import Count
 from scenes.scene import Pose
-from slam.bounded import bytes_of, text_of
+from slam.bounded import beside, bytes_of, text_of
 from slam.errors import InvalidValueError
 from slam.shaped import Table, one_of, shaped
 
-MAX_BYTES, MAX_PLAN_BYTES = 1 << 22, 1 << 26
 _Many = Meta(max_length=5000)  # walls, things, doors or pieces of furniture
-Metres = Annotated[float, Meta(ge=-1e4, le=1e4)]
-Size = Annotated[float, Meta(gt=0.0, le=1e4)]
 Point = tuple[Metres, Metres]
 At = tuple[Metres, Metres, Metres]  # m, m, degrees
 Line = Annotated[tuple[Point, ...], Meta(min_length=2, max_length=5000)]
@@ -78,8 +77,9 @@ class SceneFile(Wanted, frozen=True, kw_only=True):
 
     @property
     def plan_path(self) -> Path:
-        """Of the MJCF file, which lies beside this one."""
-        return Path(self.path).parent / self.plan
+        """Of the MJCF file: this one, or one that lies beside it."""
+        path = Path(self.path)
+        return path if path.suffix == ".xml" else beside(path, self.plan)
 
     @property
     def pieces(self) -> list[tuple[str, Pose]]:
@@ -100,7 +100,7 @@ def tables(path: Path) -> dict[str, Any]:
     """The keys of a TOML file; ``InvalidValueError`` names the file and what is wrong."""
     try:
         found = tomllib.loads(text_of(path, MAX_BYTES))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # a number of too many digits, too
         raise InvalidValueError(f"{path}: no TOML: {error}") from error
     for key in found:
         if key not in KEYS:
@@ -130,7 +130,14 @@ def read(path: Path) -> SceneFile:
 
 
 def _check(file: SceneFile) -> None:
-    """Raise ``InvalidValueError`` for an unknown kind, and a room that is none."""
+    """Raise ``InvalidValueError`` for an unknown kind, a room that is none, too many boxes."""
+    if not file.plan and not file.walls:
+        raise InvalidValueError("walls must be one polyline or more, or plan a file; got neither")
+    boxes = {"walls": sum(len(line) - 1 for line in file.walls),
+             "things": sum(len(thing.boxes) for thing in file.things)}  # fmt: skip
+    for key, n in boxes.items():
+        if n > MOST_BOXES:
+            raise InvalidValueError(f"{key} must be at most {MOST_BOXES} boxes, got {n}")
     for k, (a, b, c, d) in enumerate(file.rooms):
         if not (a < c and b < d):
             got = (a, b, c, d)
@@ -146,14 +153,14 @@ def files(path: Path) -> tuple[Path, ...]:
     """A scene's file, and those beside it that it names: its plan and its robot."""
     own = tables(path) if path.suffix == ".toml" else {}
     named = [name for name in (own.get("plan"), own.get("robot")) if isinstance(name, str)]
-    return path, *(path.parent / name for name in named if is_file(name))
+    return path, *(beside(path, name) for name in named if is_file(name))
 
 
 def sha256_of(scene: str) -> str | None:
     """Of all ``files`` of a scene by its file; None for another."""
     if not is_file(scene):
         return None
-    each = [hashlib.sha256(bytes_of(f, MAX_PLAN_BYTES)).digest() for f in files(Path(scene))]
+    each = [hashlib.sha256(bytes_of(f, MAX_BYTES)).digest() for f in files(Path(scene))]
     return hashlib.sha256(b"".join(each)).hexdigest()
 
 

@@ -109,7 +109,8 @@ class Simulation:
             scene, seed=seed, dynamism=rates, change=change, session=session, drive=drive,
             start=start, chairs=chairs, visitors=visitors(cues), robot=robot, **options,
         )  # fmt: skip
-        self._script = Script(cues, self.world) if cues else None
+        source = scene if events is None else ""
+        self._script = Script(cues, self.world, source) if cues else None
         self.odometry_preset, self.session = odometry, session
         seeds = self.world.seeds
         self._change_at_s = checked_moment(change_at_s, session)

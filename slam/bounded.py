@@ -20,6 +20,21 @@ def check_file(path: Path) -> None:
         raise LogFormatError(path, f"cannot be read: {why}") from error
 
 
+def beside(file: Path, name: str) -> Path:
+    """The path of what ``file`` names, in its folder or below.
+
+    ``LogFormatError`` for a name or a link that leads out of it.
+    """
+    path, folder = file.parent / name, file.parent
+    try:
+        inside = path.resolve().is_relative_to(folder.resolve())
+    except (OSError, RuntimeError, ValueError):  # links in a circle, a null byte
+        inside = False
+    if Path(name).is_absolute() or ".." in Path(name).parts or not inside:
+        raise LogFormatError(file, f"names the file {name!r:.80}, expected one beside it")
+    return path
+
+
 def bytes_of(path: Path, most: int) -> bytes:
     """``path.read_bytes``; ``LogFormatError`` unless it is a file of at most ``most`` bytes."""
     check_file(path)
@@ -44,7 +59,7 @@ def toml_of(path: Path, most: int) -> dict[str, Any]:
     """The tables of a TOML file; ``LogFormatError`` where it is none."""
     try:
         return tomllib.loads(text_of(path, most))
-    except (tomllib.TOMLDecodeError, RecursionError) as error:
+    except (ValueError, RecursionError) as error:  # a number of too many digits, too
         raise LogFormatError(path, f"is no TOML: {error}") from error
 
 

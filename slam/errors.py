@@ -105,6 +105,10 @@ class SlamFailedError(MobiliaError):
         return type(self)(f"{where} {self.message}", self.outcome)
 
 
+class UnstableError(MobiliaError):
+    """The physics of a simulation failed; says when, and at which joint."""
+
+
 class OutputError(MobiliaError, OSError):
     """An output file or folder cannot be written."""
 

@@ -2,7 +2,6 @@
 """Maps as files: PGM + YAML as the map_server of ROS 1 and nav2 loads them, and as a picture."""
 
 import hashlib
-import math
 import os
 import re
 import shutil
@@ -35,6 +34,8 @@ _GAP = rb"\s+(?:#[^\n]*\n\s*)*"  # PGM allows comments between the words of its 
 _PGM_HEADER = re.compile(rb"P5" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"255\s")
 _MAX_HEADER_BYTES = 4096
 MAX_PIXELS = 1 << 28  # 490 m square at 3 cm cells
+MAX_CELL_M, MIN_CELL_M = 1e3, 1e-4  # edge of a cell
+MAX_ORIGIN = 1e8  # m, rad; beyond, a float has no room for cells
 MAX_PNG_PIXELS = 178_956_970  # what Pillow unpacks, four bytes each
 _MAX_YAML_BYTES = 1 << 16
 _EDITED = ": the sum differs (after a change on purpose, delete the two lines of sums in the YAML)"
@@ -118,7 +119,7 @@ def _kept(pgm: Path) -> Path:
     return pgm.with_name(f".{pgm.stem}.earlier.pgm")
 
 
-def read_map(yaml: Path, *, saved: bool = False) -> Raster:
+def read_map(yaml: Path, *, saved: bool = False, most_pixels: int = MAX_PIXELS) -> Raster:
     """The raster of a map_server YAML file: 1 occupied, 0 free, NaN unknown.
 
     Reads binary PGM and PNG images in the modes trinary, scale (between the thresholds in
@@ -126,18 +127,19 @@ def read_map(yaml: Path, *, saved: bool = False) -> Raster:
     missing, wrong, too large, or not what the sums of ``write_map`` say; files without these sums
     are read as they are.
 
+    most_pixels  of the image
     saved  take the gray 205, which every map_saver writes for unknown, for unknown, though nav2's
            own threshold of 0.25 makes a map_server take it for free
     """
     text = text_of(yaml, _MAX_YAML_BYTES)
     image_sum = _checked_sums(yaml, text)
     fields = _yaml_fields(yaml, text)
-    resolution = _numbers(yaml, fields, "resolution", 1)[0]
-    origin = _numbers(yaml, fields, "origin", 3)
+    resolution = _numbers(yaml, fields, "resolution", 1, MIN_CELL_M, MAX_CELL_M)[0]
+    origin = _numbers(yaml, fields, "origin", 3, -MAX_ORIGIN, MAX_ORIGIN)
     mode = fields.get("mode", "trinary")
     if mode not in MODES:
         raise LogFormatError(yaml, f"mode must be one of {', '.join(MODES)}, got {mode!r:.80}")
-    gray, opaque = _read_image(yaml.parent / _field(yaml, fields, "image"), image_sum)
+    gray, opaque = _read_image(yaml.parent / _field(yaml, fields, "image"), image_sum, most_pixels)
     meant = _meaning(yaml, fields, mode)
     if saved and mode != "raw":
         meant[UNKNOWN] = np.nan
@@ -157,8 +159,8 @@ def _meaning(yaml: Path, fields: dict[str, str], mode: str) -> NDArray[np.float3
         return np.where(grays <= 100, grays / 100.0, np.nan).astype(np.float32)
     negate = fields.get("negate", "0").lower() in ("1", "true")
     occupancy = grays / 255.0 if negate else (255 - grays) / 255.0
-    high = _numbers(yaml, fields, "occupied_thresh", 1)[0]
-    low = _numbers(yaml, fields, "free_thresh", 1)[0]
+    high = _numbers(yaml, fields, "occupied_thresh", 1, -100.0, 100.0)[0]
+    low = _numbers(yaml, fields, "free_thresh", 1, -100.0, 100.0)[0]
     if not low < high:
         raise LogFormatError(yaml, f"free_thresh must be < occupied_thresh, got {low} and {high}")
     between = (occupancy - low) / (high - low) if mode == "scale" else np.nan
@@ -207,14 +209,17 @@ def _field(yaml: Path, fields: dict[str, str], key: str) -> str:
     return fields[key]
 
 
-def _numbers(yaml: Path, fields: dict[str, str], key: str, count: int) -> list[float]:
+def _numbers(
+    yaml: Path, fields: dict[str, str], key: str, count: int, low: float, high: float
+) -> list[float]:
     text = _field(yaml, fields, key)
     try:
         values = [float(word) for word in text.strip("[]").split(",")]
     except ValueError as error:
         raise LogFormatError(yaml, f"{key}: {error}") from error
-    if len(values) != count or not all(map(math.isfinite, values)):
-        raise LogFormatError(yaml, f"{key} must be {count} finite numbers, got {text!r}")
+    if len(values) != count or not all(low <= value <= high for value in values):
+        what = "a number" if count == 1 else f"{count} numbers"
+        raise LogFormatError(yaml, f"{key} must be {what} from {low:g} to {high:g}, got {text:.80}")
     return values
 
 
@@ -240,33 +245,33 @@ def _sha256(data: bytes) -> str:
 
 
 def _read_image(
-    path: Path, image_sum: str | None
+    path: Path, image_sum: str | None, most: int
 ) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
     """Gray values, and which pixels are opaque where the image says so."""
-    data = bytes_of(path, MAX_PIXELS + _MAX_HEADER_BYTES)
+    data = bytes_of(path, most + _MAX_HEADER_BYTES)
     inputs.note(path)
     if image_sum is not None and _sha256(data) != image_sum:
         raise LogFormatError(path, f"is not the image that was written{_EDITED}")
     if data.startswith(b"\x89PNG"):
-        return _png(path, data)
+        return _png(path, data, min(most, MAX_PNG_PIXELS))
     header = _PGM_HEADER.match(data[:_MAX_HEADER_BYTES])
     if header is None:
         raise LogFormatError(path, "no PNG, and not a binary PGM image of 8 bits (P5, maximum 255)")
     width, height = int(header[1][:9]), int(header[2][:9])
     pixels: NDArray[Any] = np.frombuffer(data, dtype=np.uint8, offset=header.end())
-    if not 0 < width * height <= MAX_PIXELS or len(pixels) != width * height:
+    if not 0 < width * height <= most or len(pixels) != width * height:
         raise LogFormatError(path, f"{width} x {height} pixels expected, found {len(pixels)}")
     return pixels.reshape(height, width), None
 
 
-def _png(path: Path, data: bytes) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
+def _png(path: Path, data: bytes, most: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
     """The mean of its colours, as a map_server takes it."""
     from PIL import Image, UnidentifiedImageError
 
     width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))  # of its IHDR
-    if data[12:16] == b"IHDR" and width * height > MAX_PNG_PIXELS:
+    if data[12:16] == b"IHDR" and width * height > most:
         raise LogFormatError(
-            path, f"{width} x {height} pixels, at most {MAX_PNG_PIXELS} are allowed in a PNG"
+            path, f"{width} x {height} pixels, at most {most} are allowed in a PNG"
         )
     try:
         with warnings.catch_warnings():

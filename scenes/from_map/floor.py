@@ -111,17 +111,36 @@ def rooms_of(clear: Float, floor: Mask) -> NDArray[np.int32]:
     n, seeds = cv2.connectedComponents(wide, connectivity=8)
     if n < 2:
         return np.asarray(floor, dtype=np.int32)
-    labels = seeds.astype(np.float32)
+    labels = np.pad(seeds, 1)  # the rim is no floor
     for level in np.arange(ROOM_M, -CELL_M, -0.5 * CELL_M).tolist():
-        left = floor & (clear >= level) & (labels == 0.0)
-        while left.any():
-            grown = np.where(left, cv2.dilate(labels, np.ones((3, 3), np.uint8)), 0.0)
-            reached = grown > 0.0
-            if not reached.any():
-                break
-            labels[reached] = grown[reached]
-            left &= ~reached
-    return np.asarray(labels, dtype=np.int32)
+        _grow(labels, np.pad(floor & (clear >= level), 1))
+    return np.ascontiguousarray(labels[1:-1, 1:-1])
+
+
+@njit
+def _grow(labels: NDArray[np.int32], ground: Mask) -> None:
+    """Let labels spread over ground without one, ring by ring; of several the largest stays."""
+    columns = labels.shape[1]
+    flat, left = labels.ravel(), ground.ravel()
+    around = (-columns - 1, -columns, -columns + 1, -1, 1, columns - 1, columns, columns + 1)
+    ring = np.empty(flat.size, dtype=np.int64)
+    found, first, last = np.empty(flat.size, dtype=np.int32), 0, 0
+    for at in range(flat.size):
+        if flat[at] > 0:
+            ring[last], last, left[at] = at, last + 1, False
+    while first < last:
+        end = last
+        for k in range(first, last):
+            for step in around:
+                if left[ring[k] + step]:
+                    ring[end], end, left[ring[k] + step] = ring[k] + step, end + 1, False
+        for k in range(last, end):
+            found[k] = 0
+            for step in around:
+                found[k] = max(found[k], flat[ring[k] + step])
+        for k in range(last, end):
+            flat[ring[k]] = found[k]
+        first, last = last, end
 
 
 def outdoors(labels: NDArray[np.int32], built: Mask) -> list[int]:

@@ -11,8 +11,9 @@ from numpy.typing import NDArray
 from scenes.from_map.floor import Passage, Point, Rect
 from scenes.from_map.survey import Cells, Survey, survey
 from scenes.from_map.things import Thing, things_of
-from scenes.from_map.walls import boxes_of, skin
+from scenes.from_map.walls import MAX_WALL_M, MOST_WALLS, boxes_of, skin
 from scenes.placement import gap_to_boxes
+from scenes.plan_file import check_span
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
@@ -22,12 +23,15 @@ Pose = tuple[float, float, float]
 
 OCCUPIED, FREE = 0.65, 0.25
 FINEST_M = 0.025  # cells of a map that are smaller are joined
-MAX_SIDE_M, MAX_WALL_M = 1000.0, 5000.0
+MAX_SIDE_M = 1000.0
+MAX_EDGE_M = 3.0 * MAX_WALL_M  # of what is occupied; real walls have three times their length
+MAX_AWAY_M = 9e3  # from the origin of the map; a scene has room up to 10 km
 NEAR_M = 0.05  # a cell of a wall is built where a box is that near
 LONG_M = 0.3  # a box that is shorter is a piece of one
 HULL_M = 0.15  # a robot that drives so near to a thing drives through it
 RIM_M = 1.0  # of a map round all that is occupied
 EDGE_M = 0.5  # of walls round the rooms
+NOISE = "is it a map of rooms, or noise?"
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -96,21 +100,15 @@ class MapPlan:
 def plan(map_: Raster, options: FromMap | None = None, *, source: str = "map") -> MapPlan:
     """The plan of a map; ``source`` is what errors call it.
 
-    Raises ``InvalidValueError`` for a map without floor for a robot, and for one whose walls are
-    no walls.
+    Raises ``InvalidValueError`` for a map without floor for a robot, for one whose walls are no
+    walls, and for one too large.
     """
     options = options or FromMap()
     map_ = _coarse(_cropped(map_))
     cell = map_.resolution_m
     occupied, free = map_.values > OCCUPIED, map_.values < FREE
-    _check(occupied, free, cell, source)
-    things, solid = things_of(occupied, cell) if options.things else ([], occupied)
-    walls = boxes_of(solid, cell, options.tolerance_m, few=options.few)
-    if 2.0 * walls[:, 2].sum() > MAX_WALL_M:
-        raise InvalidValueError(
-            f"{source}: {2.0 * walls[:, 2].sum():.0f} m of walls in {len(walls)} pieces; at most "
-            f"{MAX_WALL_M:g} m can be built (is it a map of rooms, or noise?)"
-        )
+    _check(map_, occupied, free, source)
+    things, solid, walls = _built(occupied, cell, options, source)
     T_map_cells = map_.T_map_origin
     if options.path is not None:  # what the robot drove through was there for a while only
         way = _dense(se2.transform(se2.inverse(T_map_cells), options.path))
@@ -122,6 +120,7 @@ def plan(map_: Raster, options: FromMap | None = None, *, source: str = "map") -
         cells, cells.mostly(free | (occupied & ~solid)), walls, boxes,
         start=options.start, path=options.path, source=source,
     )  # fmt: skip
+    check_span(source, bounds_of(floor.rooms))
     return MapPlan(
         walls=_moved(walls, T_map_cells),
         things=tuple(
@@ -141,9 +140,28 @@ def plan(map_: Raster, options: FromMap | None = None, *, source: str = "map") -
     )
 
 
+def _built(
+    occupied: NDArray[np.bool_], cell: float, options: FromMap, source: str
+) -> tuple[list[Thing], NDArray[np.bool_], Float]:
+    """Things, the cells of walls, and walls; ``InvalidValueError`` for what is noise."""
+    try:
+        things, solid = things_of(occupied, cell) if options.things else ([], occupied)
+        walls = boxes_of(solid, cell, options.tolerance_m, few=options.few)
+    except InvalidValueError as error:
+        raise InvalidValueError(f"{source}: {error} ({NOISE})") from None
+    length = 2.0 * float(walls[:, 2].sum())
+    if length > MAX_WALL_M or len(walls) > MOST_WALLS:
+        raise InvalidValueError(
+            f"{source}: {length:.0f} m of walls in {len(walls)} pieces, expected at most "
+            f"{MAX_WALL_M:g} m and {MOST_WALLS} ({NOISE})"
+        )
+    return things, solid, walls
+
+
 def _cropped(map_: Raster) -> Raster:
     """The map without what lies far from all that is occupied."""
-    rows, columns = np.nonzero(map_.values > OCCUPIED)
+    occupied = map_.values > OCCUPIED
+    rows, columns = (np.flatnonzero(occupied.any(axis=axis)) for axis in (1, 0))
     if not len(rows):
         return map_
     n = math.ceil(RIM_M / map_.resolution_m)
@@ -167,18 +185,30 @@ def _coarse(map_: Raster) -> Raster:
     return replace(map_, values=joined, resolution_m=map_.resolution_m * n)
 
 
-def _check(
-    occupied: NDArray[np.bool_], free: NDArray[np.bool_], cell_m: float, source: str
-) -> None:
+def _check(map_: Raster, occupied: NDArray[np.bool_], free: NDArray[np.bool_], source: str) -> None:
+    """Raise ``InvalidValueError`` for what is too large, nowhere, or no map of rooms."""
+    cell_m, away = map_.resolution_m, float(np.abs(map_.T_map_origin[:2]).max())
     side = max(occupied.shape) * cell_m
     if side > MAX_SIDE_M:
         raise InvalidValueError(
             f"{source}: {side:.0f} m long ({cell_m:g} m a cell), at most {MAX_SIDE_M:g} m; is its "
             "resolution in metres?"
         )
+    if away > MAX_AWAY_M:
+        raise InvalidValueError(
+            f"{source}: what is occupied begins {away:g} m from the origin of the map, expected at "
+            f"most {MAX_AWAY_M:g} m"
+        )
     if not occupied.any() or not free.any():
         what = "occupied" if free.any() else "free"
         raise InvalidValueError(f"{source}: has no {what} cells (are its thresholds right?)")
+    edges = sum(int((a != b).sum()) for a, b in ((occupied[1:], occupied[:-1]),
+                                                 (occupied[:, 1:], occupied[:, :-1])))  # fmt: skip
+    if edges * cell_m > MAX_EDGE_M:
+        raise InvalidValueError(
+            f"{source}: {edges * cell_m:.0f} m of edges of what is occupied, expected at most "
+            f"{MAX_EDGE_M:g} m ({NOISE})"
+        )
 
 
 def _thing_boxes(things: list[Thing]) -> Float:

@@ -11,6 +11,7 @@ from numpy.typing import NDArray
 from scenes.from_map import floor as floors
 from scenes.from_map.floor import Passage, Point, Rect
 from scenes.from_map.walls import footprint
+from scenes.plan_file import check_span
 from slam import se2
 from slam.errors import InvalidValueError
 
@@ -26,6 +27,7 @@ INSIDE = 0.3  # share of free floor that is inside, or else the walls have too m
 NEAR_PATH_M = 4.0  # floor of a log is so near to the robot's way
 DOOR_CLEAR_M = 1.7  # from the middle of a door to a spot to visit: 1.2 m from its hinge
 DOOR_M = (0.7, 1.2)  # gaps that may be doors
+RIM = 2  # cells around the floor when rooms are cut
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -96,7 +98,7 @@ def survey(  # noqa: PLR0913 (what is known of a building)
     away = reach & ~_beside([gap.at for gap in gaps], cells)
     found = floors.spots(passable_m, away if away.any() else reach, begin, cells.cell_m)
     spots = cells.points([begin, *found])
-    rooms = _rooms(labels, cells.cell_m, cells.T_map_cells)
+    rooms = _rooms(labels, cells.cell_m, cells.T_map_cells, source)
     x, y = start[:2] if start is not None else spots[0]
     if not any(a <= x <= c and b <= y <= d for own in rooms.values() for a, b, c, d in own):
         half = math.sqrt(0.5) * floors.ROBOT_M  # in a corner that the rectangles leave out
@@ -232,16 +234,20 @@ def _around(
 
 
 def _rooms(
-    labels: NDArray[np.int32], cell_m: float, T_map_cells: Float
+    labels: NDArray[np.int32], cell_m: float, T_map_cells: Float, source: str
 ) -> dict[str, tuple[Rect, ...]]:
     """Rectangles along the axes of the map, of floor that is all of one room."""
     height, width = labels.shape
-    corners = np.array([[0, 0], [width, 0], [0, height], [width, height]]) * cell_m
-    low = se2.transform(T_map_cells, corners).min(axis=0)
-    high = se2.transform(T_map_cells, corners).max(axis=0)
+    low, high = _corners((0, 0, width, height), cell_m, T_map_cells)
+    at_x, at_y = (np.flatnonzero(labels.any(axis=axis)) for axis in (0, 1))
+    box = int(at_x[0]), int(at_y[0]), int(at_x[-1]) + 1, int(at_y[-1]) + 1
+    first, last = _corners(box, cell_m, T_map_cells)
+    check_span(f"{source}: its floor", (*first.tolist(), *last.tolist()))
     step = floors.CELL_M
-    columns, rows = (int(v) for v in np.ceil((high - low) / step))
-    x, y = low[0] + (np.arange(columns) + 0.5) * step, low[1] + (np.arange(rows) + 0.5) * step
+    begin = np.maximum(np.floor((first - low) / step) - RIM, 0.0).astype(int)
+    end = np.ceil(np.minimum((last - low) / step + RIM, (high - low) / step)).astype(int)
+    x, y = (low[k] + (np.arange(begin[k], end[k]) + 0.5) * step for k in (0, 1))
+    rows, columns = len(y), len(x)
     points = np.column_stack([np.tile(x, rows), np.repeat(y, columns)])
     at = np.floor(se2.transform(se2.inverse(T_map_cells), points) / cell_m).astype(int)
     known = ((at >= 0) & (at < [width, height])).all(axis=1)
@@ -253,18 +259,18 @@ def _rooms(
     coarse = np.where(same, middles, 0.0).astype(np.int32)
     found: dict[str, tuple[Rect, ...]] = {}
     n_rects = 0
-    for k in range(1, int(labels.max()) + 1):
-        inside = np.asarray(coarse == k)
-        if not inside.any() or n_rects >= floors.MAX_RECTS:
-            continue
-        i, j = np.nonzero(inside)
+    for cells in _by_label(coarse):
+        if n_rects >= floors.MAX_RECTS:
+            break
+        i, j = np.divmod(cells, columns)
         i0, j0 = int(i.min()), int(j.min())
-        own = inside[i0 : int(i.max()) + 1, j0 : int(j.max()) + 1]
+        own = np.zeros((int(i.max()) + 1 - i0, int(j.max()) + 1 - j0), dtype=bool)
+        own[i - i0, j - j0] = True
         rects = floors.rectangles(own, round(floors.RECT_M / step), floors.ROOM_RECTS, 0.9)
         if not rects:
             continue
         n_rects += len(rects)
-        x0, y0 = low[0] + j0 * step, low[1] + i0 * step
+        x0, y0 = low[0] + (begin[0] + j0) * step, low[1] + (begin[1] + i0) * step
         found[f"room{len(found)}"] = tuple(
             (
                 float(x0 + c0 * step),
@@ -275,3 +281,19 @@ def _rooms(
             for r0, c0, r1, c1 in rects
         )
     return found
+
+
+def _corners(box: tuple[int, ...], cell_m: float, T_map_cells: Float) -> tuple[Float, Float]:
+    """Least and greatest (x, y) m in the map of a box of cells: columns and rows, from and to."""
+    corners = np.array([[box[i], box[j]] for i in (0, 2) for j in (1, 3)]) * cell_m
+    points = se2.transform(T_map_cells, corners)
+    return points.min(axis=0), points.max(axis=0)
+
+
+def _by_label(labels: NDArray[np.int32]) -> list[NDArray[np.int64]]:
+    """The cells of each label above 0, in their order, as places in the flat array."""
+    cells = np.flatnonzero(labels)
+    kinds = labels.ravel()[cells]
+    order = np.argsort(kinds, kind="stable")
+    ends = np.flatnonzero(np.diff(kinds[order])) + 1
+    return np.split(cells[order], ends) if len(cells) else []

@@ -64,21 +64,34 @@ def thinned(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
 
 def chains(skeleton: NDArray[np.bool_]) -> list[Chain]:
     """Its lines as (row, column) cells in order; branches that go straight on are joined."""
-    cells = set(zip(*(a.tolist() for a in np.nonzero(skeleton)), strict=True))
-    near = {cell: _neighbours(cell, cells) for cell in sorted(cells)}
+    near = _neighbours(skeleton)
     branches = [c for c in _branches(near) if not _is_spur(c, near)]
     return _joined(branches)
 
 
-def _neighbours(cell: Cell, cells: set[Cell]) -> list[Cell]:
-    """Next cells; none across a corner that a cell beside both already connects."""
-    i, j = cell
-    straight = [(i + di, j + dj) for di, dj in _AROUND[::2] if (i + di, j + dj) in cells]
-    found = list(straight)
-    for di, dj in _AROUND[1::2]:
-        if (i + di, j + dj) in cells and not {(i + di, j), (i, j + dj)} & set(straight):
-            found.append((i + di, j + dj))
-    return found
+def _neighbours(skeleton: NDArray[np.bool_]) -> dict[Cell, list[Cell]]:
+    """Next cells of each; none across a corner that a cell beside both already connects."""
+    padded = np.pad(skeleton, 1)
+    rows, columns = np.nonzero(skeleton)
+    bits = [padded[rows + 1 + di, columns + 1 + dj].astype(int) << k
+            for k, (di, dj) in enumerate(_AROUND)]  # fmt: skip
+    sorts = np.sum(bits, axis=0).tolist()
+    return {
+        (i, j): [(i + di, j + dj) for di, dj in _NEXT[sort]]
+        for i, j, sort in zip(rows.tolist(), columns.tolist(), sorts, strict=True)
+    }
+
+
+def _next(sort: int) -> list[Cell]:
+    """Of a cell with those bits of ``_AROUND`` set."""
+    there = [d for k, d in enumerate(_AROUND) if sort >> k & 1]
+    found = [d for d in there if 0 in d]
+    beside = set(found)
+    corners = [d for d in there if 0 not in d]
+    return found + [(i, j) for i, j in corners if not {(i, 0), (0, j)} & beside]
+
+
+_NEXT = [_next(sort) for sort in range(256)]
 
 
 def _branches(near: dict[Cell, list[Cell]]) -> Iterator[Chain]:

@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.from_map.walls import disc
+from slam.errors import InvalidValueError
 
 Mask = NDArray[np.bool_]
 
@@ -22,6 +23,7 @@ POST_M = 0.15  # what is smaller is a post: the column of a swivel chair, the le
 FILLED = 0.3  # share of its rectangle that a solid thing fills; below it stands on legs
 LEGS, LEGS_M = 5, 0.75  # so many posts at most are legs of one thing, that near to each other
 BIN_M = 0.35  # a solid thing up to that is a bin, a larger one a carton
+MOST_THINGS = 5000  # of a map; a scene's file has as many at most
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,12 +42,17 @@ class Thing:
 
 
 def things_of(occupied: Mask, cell_m: float) -> tuple[list[Thing], Mask]:
-    """Things that stand apart, in the frame of the cells, and the cells that are none of theirs."""
+    """Things that stand apart, in the frame of the cells, and the cells that are none of theirs.
+
+    Raises ``InvalidValueError`` for more of them than ``MOST_THINGS``.
+    """
     linked = cv2.dilate(occupied.astype(np.uint8), disc(LINK_M, cell_m))
     _, labels, stats, _ = cv2.connectedComponentsWithStats(linked, connectivity=8)
     most = (LARGEST_M + LINK_M) / cell_m
     small = np.hypot(stats[:, cv2.CC_STAT_WIDTH], stats[:, cv2.CC_STAT_HEIGHT]) <= 1.5 * most
     small[0] = False
+    if small.sum() > MOST_THINGS:
+        raise InvalidValueError(f"{small.sum()} small things, expected at most {MOST_THINGS}")
     parts: list[tuple[Box, bool]] = []
     walls = occupied.copy()
     for k in np.flatnonzero(small).tolist():
@@ -73,6 +80,7 @@ def _grouped(parts: list[tuple[Box, bool]]) -> list[Thing]:
     """Posts near each other are the legs of one thing."""
     posts = [k for k, (box, _) in enumerate(parts) if 2.0 * max(box[2:4]) <= POST_M]
     free, things = set(posts), []
+    middles = np.array([box[:2] for box, _ in parts]).reshape(-1, 2)
     for k, (box, solid) in enumerate(parts):
         if k not in free:
             if k not in posts:
@@ -85,7 +93,9 @@ def _grouped(parts: list[tuple[Box, bool]]) -> list[Thing]:
             continue
         legs = [k]
         free.discard(k)
-        for other in sorted(free, key=lambda j: math.dist(parts[j][0][:2], box[:2])):
+        near = np.hypot(*(middles - middles[k]).T) <= LEGS_M + 1e-9  # no other one is its leg
+        own = [j for j in free if near[j]]
+        for other in sorted(own, key=lambda j: math.dist(parts[j][0][:2], box[:2])):
             spots = [parts[j][0][:2] for j in (*legs, other)]
             if len(legs) < LEGS and max(math.dist(a, b) for a in spots for b in spots) <= LEGS_M:
                 legs.append(other)

@@ -10,6 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.from_map.thin import chains, thinned
+from slam.errors import InvalidValueError
 
 Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
@@ -27,6 +28,8 @@ JOINS = 2  # rounds in which boxes of one line become one
 ASIDE_M = 0.10  # an end of a box so far off the line of another is on it
 BARE = 1  # cells with nothing occupied beside them that a joined box may add
 BRIDGE_M = 0.13  # gaps up to that, in a wall seen now and then, are closed
+MAX_WALL_M, MOST_WALLS = 5000.0, 9000  # of a plan; ten times that of the largest log, in boxes
+MAX_LINE_M, MOST_LINES = 6000.0, 15_000  # of its middle lines, before they are straight
 
 
 def disc(metres: float, cell_m: float) -> NDArray[np.uint8]:
@@ -54,12 +57,17 @@ def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float, *, few: bool) ->
 
     The middle lines of walls, straightened until they would be off by ``tolerance_m``; each box
     then takes the place and the thickness of the cells beside it. With ``few``, boxes that lie on
-    one line and touch become one, where it is no barer than they are.
+    one line and touch become one, where it is no barer than they are. Raises ``InvalidValueError``
+    for more lines than any building has.
     """
     hollow, occupied = skin(bridged(occupied, cell_m), cell_m), skin(occupied, cell_m)
     around = _Around(occupied, cell_m)
+    middle = thinned(hollow)
+    _check(MAX_LINE_M, float(middle.sum()) * cell_m, "m of middle lines of walls")
+    lines = chains(middle)
+    _check(MOST_LINES, len(lines), "pieces of lines of walls")
     found = []
-    for chain in chains(thinned(hollow)):
+    for chain in lines:
         points = np.array(chain, dtype=np.int32)[:, ::-1].reshape(-1, 1, 2)
         for share in (0.5, 1.0, 1.5):
             corners = cv2.approxPolyDP(points, share * tolerance_m / cell_m, closed=False)
@@ -81,6 +89,11 @@ def boxes_of(occupied: Mask, cell_m: float, tolerance_m: float, *, few: bool) ->
     return _needed(pool, occupied, cell_m, FEW_ENOUGH)
 
 
+def _check(most: float, found: float, what: str) -> None:
+    if found > most:
+        raise InvalidValueError(f"{found:.0f} {what}, expected at most {most:g}")
+
+
 def _joined(boxes: Float, around: "_Around", near: NDArray[np.uint8], cell_m: float) -> Float:
     """Boxes for two that lie on one line and touch; ``near``: cells beside what is occupied."""
     ahead = np.column_stack([np.cos(boxes[:, 4]), np.sin(boxes[:, 4])])
@@ -88,15 +101,19 @@ def _joined(boxes: Float, around: "_Around", near: NDArray[np.uint8], cell_m: fl
     bare = np.array([_bare(box, near, cell_m) for box in boxes])
     found = []
     for k, box in enumerate(boxes):
-        off = ends - box[:2]
+        away = np.hypot(*(boxes[:, :2] - box[:2]).T)
+        close = np.flatnonzero(away <= boxes[:, 2] + box[2] + BRIDGE_M + 2.0 * ASIDE_M)
+        off = ends[close] - box[:2]
         u = off[..., 0] * ahead[k, 0] + off[..., 1] * ahead[k, 1]
         v = off[..., 1] * ahead[k, 0] - off[..., 0] * ahead[k, 1]
         low, high, half = u.min(axis=1), u.max(axis=1), box[2]
         touches = (low <= half + BRIDGE_M) & (high >= -half - BRIDGE_M)
         longer = (low < -half) | (high > half)
-        on = (abs(v).max(axis=1) <= ASIDE_M) & touches & longer & (boxes[:, 2] <= half)
-        for other in np.flatnonzero(on).tolist():
-            both, along = np.vstack([ends[k], ends[other]]), np.hstack([u[k], u[other]])
+        on = (abs(v).max(axis=1) <= ASIDE_M) & touches & longer & (boxes[close, 2] <= half)
+        own = u[int(np.searchsorted(close, k))]
+        for at in np.flatnonzero(on).tolist():
+            other = int(close[at])
+            both, along = np.vstack([ends[k], ends[other]]), np.hstack([own, u[at]])
             new = around.box(both[along.argmin()], both[along.argmax()])
             if new is None:
                 continue
@@ -138,7 +155,7 @@ def _dotted(
 
 def _needed(boxes: Float, occupied: Mask, cell_m: float, enough: float) -> Float:
     """Few of those boxes, the best first: all long ones, and ``enough`` of the cells."""
-    number = np.full(occupied.shape, -1)
+    number = np.full(occupied.shape, -1, dtype=np.int32)
     number[occupied] = np.arange(int(occupied.sum()))
     cells, covered = [], np.zeros(int(occupied.sum()), dtype=bool)
     for box in boxes:
@@ -204,11 +221,23 @@ class _Around:
         first, last = min(float(u.min()) - end, -end), max(float(u.max()), length) + end
         slope = _slope(u, v) if length > 0.4 else 0.0
         offsets = v - slope * (u - 0.5 * length)
-        near, far = np.percentile(offsets, [12.0, 88.0]).tolist()
+        near, far = _quantiles(offsets, (0.12, 0.88))
         half = min(max(0.5 * (far - near) + 0.3 * self._cell, THIN_M), THICK_M)
         middle = a + 0.5 * (first + last) * ahead + 0.5 * (near + far) * left
         yaw = math.atan2(ahead[1], ahead[0]) + math.atan(slope)
         return [*middle.tolist(), 0.5 * (last - first), half, yaw]
+
+
+def _quantiles(values: Float, shares: tuple[float, ...]) -> list[float]:
+    """As ``np.quantile``, to the bit, in a fifth of its time."""
+    ordered, found = np.sort(values).tolist(), []
+    for share in shares:
+        at = share * (len(ordered) - 1)
+        k = min(int(at), max(len(ordered) - 2, 0))
+        low, high, part = ordered[k], ordered[min(k + 1, len(ordered) - 1)], at - k
+        step = high - low
+        found.append(high - step * (1.0 - part) if part >= 0.5 else low + step * part)
+    return found
 
 
 def _slope(u: Float, v: Float) -> float:

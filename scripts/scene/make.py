@@ -33,7 +33,7 @@ from slam.maps import read_map
 from slam.rasters import trimmed
 from slam.replay import Replay
 
-CELL_M = 0.05
+CELL_M, MOST_CELLS = 0.05, 1 << 22
 RIM_M = 0.5  # beyond the bounds: whoever gets there is out
 NARROW_M = 0.1  # gaps that are narrower are not told
 DOOR_M = 1.2  # from a hinge to a spot to visit
@@ -84,7 +84,8 @@ def gap_to_nowhere(scene: Scene) -> tuple[float, tuple[float, float]] | None:
     None where walls are all around. A door that stands before a gap shuts it.
     """
     x0, y0, x1, y1 = _wider(scene, RIM_M)
-    shape = (math.ceil((y1 - y0) / CELL_M), math.ceil((x1 - x0) / CELL_M))
+    cell_m = max(CELL_M, math.sqrt((x1 - x0) * (y1 - y0) / MOST_CELLS))
+    shape = (math.ceil((y1 - y0) / cell_m), math.ceil((x1 - x0) / cell_m))
     leaves = [
         [
             *_middle(scene.initial[m.name], 0.5 * m.radius),
@@ -96,11 +97,11 @@ def gap_to_nowhere(scene: Scene) -> tuple[float, tuple[float, float]] | None:
         if m.group == "door"
     ]
     boxes = np.vstack([scene.obstacles.reshape(-1, 5), np.array(leaves).reshape(-1, 5)])
-    walls = raster_of(boxes - [x0, y0, 0.0, 0.0, 0.0], shape, CELL_M)
+    walls = raster_of(boxes - [x0, y0, 0.0, 0.0, 0.0], shape, cell_m)
     # beyond the rim all is open, and counts as far from walls
     clear = cv2.distanceTransform((~walls).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    start = (int((scene.start[1] - y0) / CELL_M), int((scene.start[0] - x0) / CELL_M))
-    low, high = 0.5 * NARROW_M / CELL_M, float(clear[start])
+    start = (int((scene.start[1] - y0) / cell_m), int((scene.start[0] - x0) / cell_m))
+    low, high = 0.5 * NARROW_M / cell_m, float(clear[start])
     if not _leaves(clear > low, start):
         return None
     for _ in range(12):
@@ -117,7 +118,7 @@ def gap_to_nowhere(scene: Scene) -> tuple[float, tuple[float, float]] | None:
     ]
     between = np.where(_part(clear > low, start), np.maximum(*away), np.inf)
     row, column = np.unravel_index(int(np.argmin(between)), clear.shape)
-    return 2.0 * low * CELL_M, (x0 + (column + 0.5) * CELL_M, y0 + (row + 0.5) * CELL_M)
+    return 2.0 * low * cell_m, (x0 + (column + 0.5) * cell_m, y0 + (row + 0.5) * cell_m)
 
 
 def _part(free: NDArray[np.bool_], at: tuple[int, int]) -> NDArray[np.bool_]:
@@ -271,6 +272,7 @@ def picture() -> Picture:
     return drawn[: round(view.to_pixels(np.array([[0.0, -0.3]]))[0][1])]
 
 
+MOST_PIXELS = 36_000_000  # of a map, 300 m square at 5 cm; to refuse such a one takes 1 GB
 SWEEPS = 4000  # scans of a log, at most, by which it is known what floor is free
 
 
@@ -308,7 +310,7 @@ def made(  # noqa: PLR0913 (by keyword)
 
 def of_file(path: Path) -> Raster:
     """The map of a map_server; raises as ``slam.maps.read_map``."""
-    return read_map(path, saved=True)
+    return read_map(path, saved=True, most_pixels=MOST_PIXELS)
 
 
 def of_log(path: Path, slam: str, *, strict: bool) -> tuple[Raster, NDArray[np.float64]]:

@@ -122,14 +122,16 @@ def show(which: Which, out: Out = None, seed: Seed = 0, width: int = 1600) -> No
 
 @scene.command("check", cls=Verb)
 def check(which: Which, seed: Seed = 0) -> None:
-    """Say what is wrong with a scene, by file and mark; nothing is simulated.
+    """Say what is wrong with a scene, by file and mark; one scan of it is simulated.
 
     [bold]mobilia scene check lab.toml[/bold]
     """
     check_names([], which)
     import scenes
     from scripts.scene.make import problems
+    from sim.simulation import Simulation
 
+    Simulation(which, seed=seed).observe()  # raises what ``run`` would
     found = list(problems(scenes.build(which, seed)))
     for problem in found:
         fact(f"{which}: {problem}", bad=True)

@@ -6,7 +6,8 @@
 step2 and then step1, each substep ends with fresh poses, and nothing is computed twice.
 
 An error of MuJoCo inside compiled code ends the process with its message: there is no Python above
-it to raise in. What a run can meet (divergence, too many contacts) is a warning, as ever.
+it to raise in. What a run can meet (divergence, too many contacts) is a warning, which
+``warned`` tells; nothing is written to MuJoCo's log in the working folder.
 """
 
 import ctypes
@@ -24,6 +25,14 @@ from numba.extending import intrinsic
 from numpy.typing import NDArray
 
 from slam._jit import inner
+from slam.errors import UnstableError
+
+_AT_A_JOINT = (
+    mujoco.mjtWarning.mjWARN_BADQPOS,
+    mujoco.mjtWarning.mjWARN_BADQVEL,
+    mujoco.mjtWarning.mjWARN_BADQACC,
+)
+mujoco.set_mju_user_warning(lambda _: None)  # else it writes MUJOCO_LOG.TXT
 
 
 class Engine(NamedTuple):
@@ -43,6 +52,29 @@ def engine(model: mujoco.MjModel, data: mujoco.MjData) -> Engine:
     names = ("mj_step1", "mj_step2", "mj_contactForce")
     step1, step2, force = (_address(getattr(library, name)) for name in names)
     return Engine(step1, step2, force, model._address, data._address)
+
+
+def forward(model: mujoco.MjModel, data: mujoco.MjData, what: str) -> None:
+    """``mj_forward``; ``UnstableError`` for more contacts than it has memory for."""
+    try:
+        mujoco.mj_forward(model, data)
+    except mujoco.FatalError as error:
+        raise UnstableError(f"{what}: {' '.join(str(error).split())}") from None
+
+
+def warned(model: mujoco.MjModel, data: mujoco.MjData) -> str:
+    """What MuJoCo has warned of since its data were reset; "" for nothing."""
+    numbers = data.warning.number
+    if not numbers.any():
+        return ""
+    kind = mujoco.mjtWarning(int(np.flatnonzero(numbers)[0]))
+    at = int(data.warning.lastinfo[int(kind)])
+    said = " ".join(mujoco.mju_warningText(int(kind), at).split())
+    if kind not in _AT_A_JOINT:
+        return said
+    first = model.jnt_qposadr if kind == mujoco.mjtWarning.mjWARN_BADQPOS else model.jnt_dofadr
+    joint = model.joint(int(np.searchsorted(first, at, side="right")) - 1).name
+    return f"{said} (joint '{joint}')"
 
 
 def _address(function: Any) -> int:

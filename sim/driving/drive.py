@@ -158,7 +158,7 @@ class Driver:
 
     def __init__(self, grid: NavGrid, goals: NDArray[np.float64], config: TourConfig) -> None:
         if len(goals) == 0:
-            raise InvalidValueError("a tour needs at least one goal")
+            raise InvalidValueError("a tour needs at least one goal, a mark 'goal:NAME'")
         self.config = config
         self.goals = np.asarray(goals, dtype=np.float64)
         self.visited = 0

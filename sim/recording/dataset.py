@@ -221,7 +221,7 @@ def read_plan(path: Path) -> Plan:
             raise LogFormatError(file, f"no plan of schema {SCHEMA}")
         levels, recipe = tuple(data.pop("dynamisms")), Recipe(**data.pop("recipe"))
         plan = Plan(recipe=recipe, dynamisms=levels, **data)
-    except (ValueError, TypeError, KeyError, RecursionError) as error:
+    except (ValueError, TypeError, LookupError, RecursionError) as error:
         raise LogFormatError(file, f"no plan of a dataset: {error}") from error
     if plan.text() != text:
         raise LogFormatError(file, "damaged: not as it was written")

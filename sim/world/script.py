@@ -25,13 +25,14 @@ from sim.core.checks import FAR_M, within, word
 from sim.world import hands
 from sim.world.populated import VISITOR
 from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
+from sim.world.robots import robot_of
 from sim.world.world import World
-from slam.bounded import toml_of
+from slam.bounded import beside, toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.frames import NS_PER_S
 
 MOST_EVENTS, MOST_BYTES = 1000, 1 << 18
-MOST_ENTER = 20  # people, of one event
+MOST_ENTER, MOST_VISITORS = 20, 400  # people, of one event and of all
 RINGS_M, ROUND = (0.9, 1.3, 1.7, 2.1, 2.5, 2.9), 16  # where people enter around a door or a goal
 _KEYS = {
     "push": {"towards_m", "heading_deg", "speed_mps"}, "open": {"for_s"}, "shut": {"for_s"},
@@ -77,7 +78,8 @@ def read_events(path: str | Path) -> list[dict[str, Any]]:
 def of_file(scene: object, sha256: str | None = None) -> dict[str, Any]:
     """``events`` and ``robot`` that a scene's own TOML file holds; nothing for other scenes.
 
-    Raises ``LogFormatError`` for a scene whose files have another hash than that.
+    Raises ``LogFormatError`` for a scene whose files have another hash than that, and for what is
+    wrong in these.
     """
     if isinstance(scene, str) and (why := changed(scene, sha256)):
         raise LogFormatError(scene, why)
@@ -86,7 +88,13 @@ def of_file(scene: object, sha256: str | None = None) -> dict[str, Any]:
     own = tables(Path(scene))
     found = {new: own[key] for key, new in (("event", "events"), ("robot", "robot")) if key in own}
     if isinstance(own.get("robot"), str) and own["robot"].endswith(".toml"):
-        found["robot"] = str(Path(scene).parent / own["robot"])
+        found["robot"] = str(beside(Path(scene), own["robot"]))
+    try:
+        cues_of(found.get("events", ()))
+        if "robot" in found:
+            robot_of(found["robot"])
+    except (InvalidValueError, UnknownNameError) as error:
+        raise LogFormatError(scene, str(error)) from error
     return found
 
 
@@ -95,6 +103,10 @@ def cues_of(rows: Sequence[Mapping[str, Any]]) -> tuple[Cue, ...]:
     if not isinstance(rows, list | tuple) or len(rows) > MOST_EVENTS:
         raise InvalidValueError(f"events must be at most {MOST_EVENTS} tables, got {rows!r:.80}")
     cues = [_cue(f"event {k + 1}", row) for k, row in enumerate(rows)]
+    if visitors(cues) > MOST_VISITORS:
+        raise InvalidValueError(
+            f"events: {visitors(cues)} people enter, expected at most {MOST_VISITORS}"
+        )
     return tuple(sorted(cues, key=lambda cue: cue.at_s))
 
 
@@ -152,13 +164,13 @@ def visitors(cues: Sequence[Cue]) -> int:
 
 
 class Script:
-    """Lets the events of a world happen.
+    """Lets the events of a world happen; ``source``: whose they are, for the errors.
 
     Raises ``UnknownNameError`` for a thing, door or goal that the world does not have, and
     ``InvalidValueError`` for a robot that would be carried into a wall.
     """
 
-    def __init__(self, cues: Sequence[Cue], world: World) -> None:
+    def __init__(self, cues: Sequence[Cue], world: World, source: str = "") -> None:
         self._cues, self.done = tuple(cues), [False] * len(cues)
         guests = [name for name in world.people.names if name.startswith(VISITOR)]
         self._guests: list[list[str]] = []
@@ -166,7 +178,8 @@ class Script:
             try:
                 _check(cue.request, world)
             except (UnknownNameError, InvalidValueError) as error:
-                raise type(error)(f"event at {cue.at_s:g} s: {error}") from error
+                where = f"{source}: event" if source else "event"
+                raise type(error)(f"{where} at {cue.at_s:g} s: {error}") from error
             n, first = visitors([cue]), visitors(cues[:k])
             self._guests.append(guests[first : first + n])
 

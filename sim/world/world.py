@@ -24,7 +24,7 @@ from sim.core.bodies import Bodies
 from sim.core.checks import instance, one_of, within
 from sim.core.contacts import Contact, RobotContacts
 from sim.core.dynamism import Dynamism
-from sim.core.engine import engine
+from sim.core.engine import engine, forward, warned
 from sim.core.packed import packed
 from sim.core.seeds import Seeds
 from sim.world import sessions, substeps
@@ -32,7 +32,7 @@ from sim.world.populated import crowd_for, crowded, populated, with_visitors
 from sim.world.robots import robot_of, with_robot
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.times_of_day import time_of
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, UnstableError
 from slam.frames import LaserSpec
 
 __all__ = ["SUBSTEPS_PER_S", "SUBSTEPS_PER_TICK", "World"]
@@ -119,7 +119,7 @@ class World:
         if start is not None:
             self.bodies.place_robot(self.data, start)
         self.people.start(self.data, waiting=visitors)
-        mujoco.mj_forward(self.model, self.data)
+        forward(self.model, self.data, f"scene '{self.scene.name}'")
         self._pinned = substeps.loose()
         self._room = self._tables()
         self._unseen = packed(substeps.unseen(2))
@@ -231,12 +231,19 @@ class World:
         self.advance(0, 1, self._unseen)
 
     def advance(self, first: int, last: int, watch: Any) -> None:
-        """Make the substeps that end at rows ``first + 1`` to ``last`` of a packed ``Watch``."""
+        """Make the substeps that end at rows ``first + 1`` to ``last`` of a packed ``Watch``.
+
+        Raises ``UnstableError`` where MuJoCo warns: what it goes on with is no physics.
+        """
         row = substeps.advance(first, last, False, self._room, watch)
         if row < last:  # the first touch
             self._contacts.locate(self.data)
             self._room = self._tables()
             substeps.advance(row, last, True, self._room, watch)
+        if self.data.warning.number.any():
+            at_s = 1e-9 * self.time_ns
+            said = warned(self.model, self.data)
+            raise UnstableError(f"scene '{self.scene.name}' at {at_s:.2f} s: {said}")
 
     # -- the robot --------------------------------------------------------------------------
 

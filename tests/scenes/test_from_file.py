@@ -1,12 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scenes drawn in TOML: what they hold, and what is said of those that are wrong."""
 
+import os
 import re
 
 import pytest
 
 import scenes
 from scripts.scene.make import contents, problems
+from sim.simulation import Simulation
 from slam.errors import InvalidValueError, MobiliaError
 
 LAB = """\
@@ -131,3 +133,80 @@ def test_a_mark_puts_furniture_by_kind_and_place(tmp_path):
     plan.write_text(SHED.replace("chair_swivel", "chair"))
     with pytest.raises(InvalidValueError, match="'put:chair' has the unknown kind 'chair'"):
         scenes.build(str(plan), 1)
+
+
+BOX = "walls = [[[0, 0], [8, 0], [8, 5], [0, 5], [0, 0]]]\nstart = [1, 1, 0]\n"
+
+
+@pytest.mark.parametrize(
+    ("text", "says"),
+    [
+        (BOX + "goals = [[nan, 1]]", r"goals\[0\]\[0\] must be a number from"),
+        (BOX + "goals = [[inf, 1]]", r"goals\[0\]\[0\] must be a number from"),
+        (BOX + "goals = [[1e300, 1]]", r"goals\[0\]\[0\] must be a number from"),
+        (BOX + f"goals = [[1{'0' * 400}, 1]]", r"goals\[0\]\[0\] must be a number"),
+        (BOX + f"wall_m = {'9' * 5000}", "no TOML: .*limit"),
+        (BOX + "start = 1", "no TOML"),
+        (BOX + f"wall_m = {'[' * 5000}", "no TOML"),
+        (BOX + "rooms = [[0, 0, 9000, 9000]]", "at most 60000 m2|is in no room"),
+        (BOX.replace("8, 0", "9000, 0").replace("8, 5", "9000, 9000"), "at most 60000 m2"),
+        (BOX + "wall_m = nan", "wall_m must be a number"),
+        (f"walls = [[{'[0, 0], [8, 0], ' * 6000}[8, 5]]]\n", "walls.* of 2 to 5000 values"),
+        (f"walls = [{('[' + '[0, 0], [8, 5], ' * 2000 + '], ') * 4}]\n", "at most 10000 boxes"),
+        (BOX + "put = [" + '["desk", 4, 3, 0], ' * 1100 + "]", "at most 1000 pieces of furniture"),
+        (BOX + "put = [" + '["bin", 4, 3, 0], ' * 2 + "]", r"'bin1' at \(4, 3\) stands in 'bin0'"),
+        ("walls = []", "walls must be one polyline or more"),
+        ('plan = ""', "walls must be one polyline or more"),
+        ('plan = "/etc/shed.xml"', "'/etc/shed.xml', expected one beside it"),
+        ('plan = "../shed.xml"', "'../shed.xml', expected one beside it"),
+        ('plan = "out.xml"', "'out.xml', expected one beside it"),
+        ('plan = "pipe.xml"', r"pipe\.xml: cannot be read: not a file"),
+        ('plan = "loop.xml"', "beside it|cannot be read"),
+    ],
+)  # fmt: skip
+def test_values_and_paths_that_cannot_be_are_told_in_one_line(lab, tmp_path, text, says):
+    inside = tmp_path / "in"
+    inside.mkdir()
+    (tmp_path / "shed.xml").write_text(SHED)
+    (inside / "out.xml").symlink_to(tmp_path / "shed.xml")
+    (inside / "loop.xml").symlink_to("loop.xml")
+    os.mkfifo(inside / "pipe.xml")
+    file = inside / "lab.toml"
+    file.write_text(text)
+    with pytest.raises(MobiliaError, match=says) as told:
+        scenes.build(str(file))
+    assert "in/" in str(told.value)
+    assert "\n" not in str(told.value)
+
+
+@pytest.mark.parametrize("name", ["/etc/robot.toml", "../robot.toml"])
+def test_a_robot_from_elsewhere_is_refused(lab, name):
+    with pytest.raises(MobiliaError, match="expected one beside it"):
+        Simulation(lab(BOX + f'robot = "{name}"'))
+
+
+ENTER = "[[event]]\nat_s = 1\nenter = 20\nby = [{}, 3]\n"
+
+
+@pytest.mark.parametrize(
+    ("more", "says"),
+    [
+        (ENTER.format(3) * 30, "events: 600 people enter, expected at most 400"),
+        (ENTER.format(999), "event at 1 s: nobody finds room to enter"),
+        ("[[event]]\nat_s = nan\nenter = 1\nby = [3, 3]\n", "event 1: at_s must be a number"),
+        ('robot = "roomba"\n', "no robot is called 'roomba'"),
+    ],
+)
+def test_what_is_wrong_in_its_events_and_robot_is_told_with_the_file(lab, more, says):
+    with pytest.raises(MobiliaError, match=rf"lab\.toml: {says}"):
+        Simulation(lab(BOX + more))
+
+
+def test_things_beyond_the_most_stand(lab, monkeypatch):
+    monkeypatch.setattr("scenes.from_file.MOST_MOVING", 1)
+    things = "".join(
+        f'{{ kind = "bin", at = [{x}, 3, 0], boxes = [[{x}, 3, 0.2, 0.2, 0]] }}, ' for x in (3, 5)
+    )
+    scene = scenes.build(lab(BOX + f"things = [{things}]"))
+    assert [mover.kind for mover in scene.movers] == ["bin", "robot"]
+    assert scene.spec.geom("wall:thing0") is not None

@@ -27,6 +27,14 @@ def _wrapped(angle: float) -> float:
 
 
 @inner
+def row_of(place: float, last: int) -> int:
+    """The row of a table that a number falls into, 0 to ``last`` whatever the number."""
+    if place < last:
+        return int(place) if place > 0.0 else 0
+    return last  # not a number, too
+
+
+@inner
 def _turned_by(delta: float) -> tuple[float, float]:
     """(cos, sin) of what a robot turns in a step: series to 1e-17 below 0.03 rad."""
     if abs(delta) > 0.03:

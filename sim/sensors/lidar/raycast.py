@@ -11,7 +11,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
-from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, lay_fans, ray_wedge
+from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, lay_fans, ray_wedge, row_of
 from sim.sensors.lidar.ray_shapes import Pose, face_normal, meet
 from sim.sensors.lidar.windows import enclose, find_windows, nearest_first
 from slam._jit import inner, uncounted
@@ -100,10 +100,10 @@ def _cast_windows(  # noqa: PLR0913, PLR0915 (kernel)
             start, uneven = frames[f, col.START], frames[f, col.UNEVEN]
             lowest = (windows[row, col.LOW] - uneven - start) * per_step
             highest = (windows[row, col.HIGH] + uneven - start) * per_step
-            margin = slope * per_step
-            first = base + max(math.ceil(lowest - margin), 0)
-            last = min(base + math.floor(highest + margin), ends[f + 1] - 1)
-            for i in range(first, last + 1):
+            margin, end = slope * per_step, ends[f + 1] - base
+            first = base + row_of(np.ceil(lowest - margin), end)
+            last = base + row_of(np.floor(highest + margin) + 1.0, end)
+            for i in range(first, last):
                 if near > farthest[layer, i]:
                     continue
                 c, s = fan[i, col.COS], fan[i, col.SIN]

@@ -18,6 +18,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
+from sim.sensors.lidar.fan import row_of
 from slam._jit import inner, njit
 
 Float = NDArray[np.float64]
@@ -99,7 +100,7 @@ def detect(  # noqa: PLR0913 (kernel)
     row = 0
     while row < order.size and distances[order[row]] < math.inf:
         row, energy, place, strongest = _next_pulse(distances, energies, surfaces, order, row)
-        if energy <= 0.0 or energy < needed[min(int(place / NEEDED_STEP), needed.size - 1)]:
+        if energy <= 0.0 or energy < needed[row_of(place / NEEDED_STEP, needed.size - 1)]:
             continue
         if pulse > 0.0 and row < order.size and distances[order[row]] < math.inf:
             _, behind, far, _ = _next_pulse(distances, energies, surfaces, order, row)
@@ -172,7 +173,7 @@ def receive(  # noqa: PLR0913, PLR0915 (kernel)
         if rays == k_rays and high - low <= (SAME_SURFACE if alike else SAME_PULSE):
             # Surely one pulse, so that no order is needed; most beams are.
             middle = moment / total if total > 0.0 else math.inf
-            if total > 0.0 and total >= needed[min(int(middle / NEEDED_STEP), needed.size - 1)]:
+            if total > 0.0 and total >= needed[row_of(middle / NEEDED_STEP, needed.size - 1)]:
                 place, ray = middle, strongest
         elif rays > 1 or distances[0] < math.inf:
             chance = chances[i] if pulse > 0.0 else 0.0  # none are drawn where nothing mixes
@@ -200,7 +201,7 @@ def measure(hits: tuple[Float, Int, Float], out: tuple[Float, Int, Bool]) -> Non
 def _correction(error: tuple[Float, float], place: float, brightness: float) -> float:
     """Systematic error of the unit at a distance, for a reflectivity."""
     by_range, by_reflectivity = error
-    bin_ = min(int(place / ERROR_STEP), by_range.size - 2)
+    bin_ = row_of(place / ERROR_STEP, by_range.size - 2)
     part = place / ERROR_STEP - bin_
     smooth = float(by_range[bin_] * (1.0 - part) + by_range[bin_ + 1] * part)
     return smooth + by_reflectivity * (2.0 * min(max(brightness, 0.0), 1.0) - 1.0)

@@ -11,7 +11,7 @@ import math
 from typing import Any, NamedTuple
 
 from sim.sensors.lidar import columns as col
-from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3
+from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, row_of
 from slam._jit import inner, uncounted
 
 BUCKETS = 64
@@ -250,7 +250,7 @@ def find_windows(  # noqa: PLR0913 (kernel)
             continue
         distance = math.sqrt(dx * dx + dy * dy)
         gap = abs(bounds[j, col.DISC_Z] - height) - bounds[j, col.DISC_HALF] - aperture
-        if gap > slope * (distance + reach) + SLACK:
+        if not gap <= slope * (distance + reach) + SLACK:  # nor where one is not a number
             continue
         if (
             table[j, col.KIND] == col.BOX
@@ -281,10 +281,10 @@ def nearest_first(windows: Float, found: int, order: Int) -> None:
     starts = order[len(order) - BUCKETS - 1 :]
     starts[:] = 0
     for row in range(found):
-        starts[1 + min(int(4.0 * windows[row, col.NEAR]), BUCKETS - 1)] += 1
+        starts[1 + row_of(4.0 * windows[row, col.NEAR], BUCKETS - 1)] += 1
     for k in range(BUCKETS):
         starts[k + 1] += starts[k]
     for row in range(found):
-        k = min(int(4.0 * windows[row, col.NEAR]), BUCKETS - 1)
+        k = row_of(4.0 * windows[row, col.NEAR], BUCKETS - 1)
         order[starts[k]] = row
         starts[k] += 1

@@ -10,6 +10,7 @@ import pytest
 
 from sim.moments import toured
 from sim.recording.bag import BagWriter
+from sim.recording.dataset import Plan, read_plan
 from sim.recording.recipe import RECIPE, Recipe, read_recipe, write_recipe
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation, stream
@@ -93,3 +94,11 @@ def test_twins_of_a_scanner_between_the_steps_have_one_path_odometry_and_timing(
     assert still[0].scan is not None
     agree = moving[0].scan.ranges == still[0].scan.ranges
     assert math.isclose(float(agree.mean()), 1.0, abs_tol=0.2)
+
+
+def test_a_dataset_of_an_unknown_scanner_is_refused_by_its_file(tmp_path):
+    recipe = Recipe(scene="arena", seed=1, dynamism=0.5, seconds=0.1, scanner="ideal")
+    text = Plan(recipe=recipe, dynamisms=(0.5,), episodes=2).text()
+    (tmp_path / "dataset.json").write_text(text.replace('"ideal"', '"eyes"'))
+    with pytest.raises(LogFormatError, match=r"dataset\.json: .*no scanner is called 'eyes'"):
+        read_plan(tmp_path)

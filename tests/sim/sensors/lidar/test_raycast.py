@@ -298,3 +298,28 @@ def test_an_unknown_robot_is_refused() -> None:
     model = mujoco.MjModel.from_xml_string("<mujoco/>")
     with pytest.raises(InvalidValueError, match="no body 'robot/base'"):
         Raycaster(model, height=HEIGHT)
+
+
+@pytest.mark.parametrize("far", [1e19, -1e19, 3e38, 1e300, math.inf, -math.inf, math.nan])
+def test_what_is_nowhere_is_not_met_and_harms_nothing(far: float) -> None:
+    """No place of a geom is one of the caster's tables: 1e19 m wrote beside them, once."""
+    spec = mujoco.MjSpec()
+    for x in (3.0, -3.0):
+        spec.worldbody.add_geom(type=mujoco.mjtGeom.mjGEOM_BOX, size=[0.1, 0.5, 1], pos=[x, 0, 0.4])
+    for kind in SHAPES:
+        body = spec.worldbody.add_body()
+        body.add_freejoint()
+        body.add_geom(type=kind, size=[0.3, 0.3, 0.3])
+    model = spec.compile()
+    data = mujoco.MjData(model)
+    mujoco.mj_forward(model, data)
+    angles = np.linspace(-0.1, 0.1, 5)
+    for axis in range(3):
+        mujoco.mj_forward(model, data)
+        data.geom_xpos[2:, axis] = far
+        caster = Raycaster(model, height=HEIGHT, robot=None)
+        caster.start(data)
+        ranges, geoms, _ = cast(caster, angles, (0.0, 0.0, 0.0))
+        np.testing.assert_allclose(ranges[:, 0], 2.9 / np.cos(angles))
+        assert (geoms == 0).all()
+        cast(caster, angles, (far, 0.0, 0.0))  # by a laser that is nowhere, too
