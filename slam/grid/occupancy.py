@@ -20,14 +20,10 @@ from slam.settings import Settings, number
 from slam.system import Raster, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
-    ANEW,
     FREE_COUNT,
-    KNOWN,
     SIDE,
-    THROUGH,
     Cells,
     Look,
-    fresh,
     in_reach,
     stamped,
 )  # fmt: skip
@@ -108,7 +104,6 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
 def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     cells: Cells, log_odds: NDArray[np.float32], view: View, T_map_laser: NDArray[np.float64],
     cell: float, step: float, odds: Odds, known_s: float, off: int, write: bool,
-    counted: NDArray[np.uint8],
 ) -> Look:  # fmt: skip
     """Add one scan, ``step`` s after the last, to ``log_odds`` (S, 8, 8) by slot.
 
@@ -116,8 +111,7 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     looked at.
     """
     confirmed, contradicted, visited = 0.0, 0.0, 0
-    known, through = 0.0, 0.0
-    once = counted.shape[1] > 0
+    known, through, sure = 0.0, 0.0, 0.0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
@@ -146,11 +140,12 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
                         if not seen_empty(view, c * px + s * py, c * py - s * px, free):
                             continue
                         contradicted += y
-                        through += fresh(counted, once, THROUGH, slot, jj, ii, weight)
+                        through += weight
+                        sure += weight**3
                         more = odds.miss
                     else:
                         confirmed += y * given
-                        known += fresh(counted, once, KNOWN, slot, jj, ii, weight * given)
+                        known += weight * given
                         if write:
                             before = cells.off[slot, jj, ii]
                             cells.off[slot, jj, ii] = stamped(before, weight, SURE, off)
@@ -164,7 +159,8 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
                         log_odds[slot, jj, ii] = now
                         cells.age[slot, jj, ii] += step
                         cells.y[slot, jj, ii] = max(math.tanh(0.5 * now), 0.0)
-    return Look(confirmed, contradicted, visited, known * cell, through * cell / SURE**3)
+    sure *= cell / SURE**3
+    return Look(confirmed, contradicted, visited, known * cell, through * cell, sure)
 
 
 @njit
@@ -238,7 +234,6 @@ class Grid(CellMap):
         step: float,
         *,
         write: bool,
-        counted: NDArray[np.uint8] = ANEW,
     ) -> Look:
         """As ``CellMap.integrate``; a grid counts scans, but keeps for how long it has looked."""
         if write:
@@ -249,7 +244,7 @@ class Grid(CellMap):
                 self.grow()
         result = integrate(
             self.cells, self.log_odds, view, T_map_laser, self.cell, step, self._odds,
-            self.config.map.known_s, self.off_cm, write, counted,
+            self.config.map.known_s, self.off_cm, write,
         )  # fmt: skip
         if write:
             self.release()

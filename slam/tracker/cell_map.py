@@ -18,7 +18,6 @@ from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frontend.visibility import View
 from slam.tracker.cells import (
-    ANEW,
     FIRST,
     MOST_OFF,
     SIDE,
@@ -133,12 +132,8 @@ class CellMap(abc.ABC):
         step: float,
         *,
         write: bool,
-        counted: NDArray[np.uint8] = ANEW,
     ) -> Look:
-        """Take the present impressions in for ``step`` s; ``write`` False only looks.
-
-        ``counted``: (2, S, 8, 8) as of ``cells.uncounted``; by default each look counts anew.
-        """
+        """Take the present impressions in for ``step`` s; ``write`` False only looks."""
 
     def window(
         self, xmin: float, ymin: float, xmax: float, ymax: float

@@ -71,9 +71,9 @@ class Look(NamedTuple):
     visited       cells that it says something of
     known         m of long-known surface that it confirms: a trace y that was looked at for ``age``
                   s counts w = y age / (age + known_s)
-    through       the same that it sees through, (w c / ``SURE`` of the map)^3, c as of ``crossed``.
-                  What was there in few of the looks was no wall, and need not be there now. Of
-                  both, what was ``counted`` before counts by what is more of it now
+    through       the same that it sees through, by w c, c as of ``crossed``
+    sure          the same by (w c / ``SURE`` of the map)^3: what was there in few of the looks was no
+                  wall, and need not be there now
     """
 
     confirmed: float
@@ -81,17 +81,10 @@ class Look(NamedTuple):
     visited: int
     known: float
     through: float
+    sure: float
 
 
-ANEW = np.zeros((2, 0, SIDE, SIDE), np.uint8)  # nothing was counted, and nothing is kept of it
-WHOLE = 255.0  # of a cell that is counted
 LEAST_M = 1e-6  # m; a shorter beam has no direction: numerical guard
-KNOWN, THROUGH = 0, 1  # kinds of what is counted
-
-
-def uncounted(cells: Cells) -> NDArray[np.uint8]:
-    """(2, S, 8, 8) what was counted of each cell as known and as seen through: nothing so far."""
-    return np.zeros((2, len(cells.free), SIDE, SIDE), np.uint8)
 
 
 @inner
@@ -105,23 +98,6 @@ def crossed(facing: int, x: float, y: float) -> float:
         return 1.0
     way = math.tau / FACES * (facing & (FACES - 1))
     return abs(x * math.cos(way) + y * math.sin(way)) / max(math.sqrt(x * x + y * y), LEAST_M)
-
-
-@inner
-def fresh(  # noqa: PLR0913 (kernel)
-    counted: NDArray[np.uint8], once: bool, kind: int, slot: int, j: int, i: int, weight: float
-) -> float:
-    """What of a weight in [0, 1] was not counted before; it is now. Of cubes if seen through."""
-    before = 0.0
-    if once:
-        now, earlier = np.uint8(WHOLE * weight + 0.5), counted[kind, slot, j, i]
-        if now <= earlier:
-            return 0.0
-        counted[kind, slot, j, i] = now
-        if kind == KNOWN:
-            return (float(now) - float(earlier)) / WHOLE
-        weight, before = float(now) / WHOLE, float(earlier) / WHOLE
-    return weight if kind == KNOWN else weight**3 - before**3
 
 
 @inner

@@ -57,9 +57,6 @@ class TrackerConfig(Settings):
         "tracking.quality.give_up_s": "tracking.give_up_s",
         "standing.doubtful_m": "standing.alert_m",
         "standing.long_window_s": "standing.window_s",
-        "belief.searches": "belief.searched",
-        "belief.through_per_m": "belief.through",
-        "belief.changed_per_m": "belief.through",
     }
     constants: ClassVar[Mapping[str, str]] = {
         "frontend": "slam.frontend.observations",

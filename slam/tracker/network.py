@@ -17,17 +17,13 @@ from slam.frontend.surfaces import opposite
 from slam.frontend.visibility import View, free_around, seen_empty
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
-    ANEW,
     FREE_COUNT,
-    KNOWN,
     MASK,
     SHIFT,
     SIDE,
-    THROUGH,
     Cells,
     Look,
     crossed,
-    fresh,
     in_reach,
     named,
     released,
@@ -96,20 +92,18 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
     cell: float,
     numbers: tuple[Any, ...],
     write: bool,
-    counted: NDArray[np.uint8],
 ) -> Look:
     """One semi-implicit Gauss-Seidel sweep of Eq. (8) over the neurons in view.
 
     ``write`` False only looks. Impressions are consumed (their scratch is released) when written.
-    ``counted``: see ``cells.Look``. ``arrays`` of ``Cells``, ``View`` and the ``numbers`` of a
+    ``arrays`` of ``Cells``, ``View`` and the ``numbers`` of a
     ``Law`` as plain tuples: those get here sooner.
     """
     cells, v, n = named(arrays), plain_view, numbers
     view = View(v[0], v[1], v[2], v[3], v[4], v[5])
     law = Law(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11])
     confirmed, contradicted, visited = 0.0, 0.0, 0
-    known, through = 0.0, 0.0
-    once = counted.shape[1] > 0
+    known, through, sure = 0.0, 0.0, 0.0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
@@ -150,13 +144,14 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                             y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
                         )
                         weight *= crossed(cells.facing[slot, jj, ii], px, py)
-                        through += fresh(counted, once, THROUGH, slot, jj, ii, weight)
+                        through += weight
+                        sure += weight**3
                     elif not behind:
                         confirmed += y * given
                         weight = (
                             y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
                         )
-                        known += fresh(counted, once, KNOWN, slot, jj, ii, weight * given)
+                        known += weight * given
                         if write:
                             before = cells.off[slot, jj, ii]
                             cells.off[slot, jj, ii] = stamped(before, weight, SURE, law.off)
@@ -190,7 +185,8 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                 cells.counts[FREE_COUNT] += 1
     if write:
         released(cells)
-    return Look(confirmed, contradicted, visited, known * cell, through * cell / SURE**3)
+    sure *= cell / SURE**3
+    return Look(confirmed, contradicted, visited, known * cell, through * cell, sure)
 
 
 class Network(CellMap):
@@ -211,7 +207,6 @@ class Network(CellMap):
         step: float,
         *,
         write: bool,
-        counted: NDArray[np.uint8] = ANEW,
     ) -> Look:
         """Take the present impressions in for ``step`` s; see the kernel of the same name."""
         numbers, pace = self.config.map, self.pace(step)
@@ -230,7 +225,7 @@ class Network(CellMap):
             self.off_cm,
         )
         arrays = tuple(self.cells)
-        return integrate(arrays, tuple(view), T_map_laser, self.cell, law, write, counted)
+        return integrate(arrays, tuple(view), T_map_laser, self.cell, law, write)
 
 
 def lateral_mu(total: float, reach: float) -> float:

@@ -13,12 +13,13 @@ from typing import Any
 import numpy as np
 from numpy.typing import NDArray
 
+from slam import se2
 from slam._jit import inlined, inner, uncounted
 from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.surfaces import turned_face
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, named
+from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Look, named
 from slam.tracker.map_config import MapConfig
 
 FINE = MapConfig().bell_steps
@@ -264,3 +265,12 @@ def rasterise(cell_map: CellMap, observations: Observations, T_map_robot: Float)
             done = 0
         elif done < n:
             cell_map.grow()
+
+
+def seen_at(cell_map: CellMap, observations: Observations, T_map_robot: Float) -> Look:
+    """What a scan says of the map from a pose; nothing is written."""
+    rasterise(cell_map, observations, T_map_robot)
+    T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
+    look = cell_map.integrate(observations.view, T_map_laser, 0.0, write=False)
+    cell_map.release()
+    return look

@@ -21,7 +21,7 @@ from slam.path import PosePath
 from slam.tracker import map_file as memory
 from slam.tracker.belief.belief import Belief, Judged
 from slam.tracker.belief.places import coarse
-from slam.tracker.belief.status import State, Status
+from slam.tracker.belief.state import State
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MOST_OFF
 from slam.tracker.config import TrackerConfig
@@ -72,7 +72,6 @@ class Tracker(abc.ABC):
         new_submap = partial(self._new_submap, self.config)
         self._loops = Loops(self.config, self._matcher, new_submap, new_map)
         self._trusted = True  # the pose of the frame before
-        self._doubted_since = 0  # frame
         self._path = PosePath()
 
     @staticmethod
@@ -82,8 +81,7 @@ class Tracker(abc.ABC):
 
     def _believe(self, match: Callable[[Observations, Prediction, CellMap], Match]) -> None:
         """``match`` matches a scan to the map, or to a copy of it."""
-        usual, agreement = self._matcher.usual, self._standing.agreement
-        self._belief = Belief(self.config, self._matcher, match, usual, agreement)
+        self._belief = Belief(self._matcher, match, self._standing.agreement)
 
     def _map_anew(self) -> CellMap:
         """An empty map for what the present one has."""
@@ -118,7 +116,7 @@ class Tracker(abc.ABC):
         match, state = judged.match, judged.state
         if state is State.TRACKING or not self._belief.certain:
             self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
-        estimate = self._report(frame, match, state, trust, judged.likeliest)
+        estimate = self._report(frame, match, trust)
         self._search_loops()
         return estimate
 
@@ -133,7 +131,8 @@ class Tracker(abc.ABC):
         match = unmatched(np.zeros(3), matched=1.0, score=0.0)
         self._loops.add(match.T_map_robot, np.zeros(3), np.zeros((3, 3)), observations)
         self._standing.add(frame.stamp_ns, match.T_map_robot, observations)
-        return self._report(frame, match, self._belief.first(observations))
+        self._belief.first(observations)
+        return self._report(frame, match)
 
     def _search_loops(self) -> None:
         """Not in a scan in which the robot was searched for, which takes its time."""
@@ -180,13 +179,8 @@ class Tracker(abc.ABC):
         if observations.weight >= relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = prediction.changed(carried=self._pose_covariance.odometry_part(motion))
-        doubt = self._belief.doubt
-        judged = self._belief.judge(self.cell_map, self._T_map_robot, observations, prediction)
+        judged = self._belief.judge(self.cell_map, observations, prediction)
         self.cell_map = judged.cell_map
-        if judged.restored:
-            self._loops.unwrite(self._doubted_since)
-        if self._belief.doubt is not doubt:
-            self._doubted_since = self._loops.n_frames
         if judged.state is State.RELOCATED:
             self._pose_covariance.relocated(coarse(relocalise))
         return judged
@@ -209,9 +203,9 @@ class Tracker(abc.ABC):
             self.cell_map.off_cm = math.ceil(min(100.0 * self._pose_covariance.off_m, MOST_OFF))
             rasterise(self.cell_map, observations, T_map_robot)
             T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
-            seen = self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
+            self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
             if tracked:
-                self._belief.learn(observations, judged, seen)
+                self._belief.learn(judged)
         return evidence if tracked else None
 
     def _update_uncertainty(
@@ -246,7 +240,7 @@ class Tracker(abc.ABC):
         match, prediction, state = judged.match, judged.prediction, judged.state
         motion = se2.between(self._T_map_robot, match.T_map_robot)
         covariance = self._pose_covariance.newest_drift
-        found = state is State.RELOCATED
+        found = state is State.RELOCATED or match.slipped
         if found:  # carried away, or odometry was right: loops decide
             off = prediction.off(match.T_map_robot)
             covariance = prediction.covariance + coarse(self.config.tracking.relocalise)
@@ -264,18 +258,14 @@ class Tracker(abc.ABC):
             found=found,
         )  # fmt: skip
 
-    def _report(
-        self, frame: Frame, match: Match, state: State, trust: float = 1.0,
-        elsewhere: Float | None = None,
-    ) -> Estimate:  # fmt: skip
-        """At the likeliest place, with the covariance of all places where the robot may be."""
+    def _report(self, frame: Frame, match: Match, trust: float = 1.0) -> Estimate:
+        """Where motion led, with the covariance of all places where the robot may be."""
         sure, belief = self._pose_covariance, self._belief
         self._before, self._T_map_robot = frame.odometry, match.T_map_robot
-        T_map_robot = match.T_map_robot if elsewhere is None else elsewhere
+        T_map_robot, state = match.T_map_robot, belief.state
         p_lost = 1.0 - (1.0 - belief.p_lost) * (1.0 - sure.p_off)
-        lost = p_lost >= 0.5 and belief.status is not Status.BLIND
         doubtful = p_lost > self.config.belief.frozen_above
-        self._path.add(frame.stamp_ns, match.T_map_robot, elsewhere)
+        self._path.add(frame.stamp_ns, T_map_robot)
         covariance = sure.covariance + belief.spread_about(T_map_robot, self._loops.anywhere)
         return Estimate(
             stamp_ns=frame.stamp_ns,
@@ -292,7 +282,6 @@ class Tracker(abc.ABC):
                 "nis": self._odometry_noise.nis,
                 "trust": trust,
                 "odometry_ratio": self._standing.agreement.ratio,
-                "verdict": (Status.LOST if lost else belief.status).value,
                 "p_lost": p_lost,
                 "correction": self._path.moved_by.tolist(),
                 "T_map_odom": self._path.T_map_odom.tolist(),

@@ -2,12 +2,11 @@
 """Other places where the robot may be, each followed from scan to scan.
 
 They come from a search nearby and from a search of the whole map; each is carried along by odometry
-and matched to the scans. A scan does no more of this than its budget allows: the search goes on
+and matched to the scans, which say how much of them the map explains there. A scan does no more of this than its budget allows: the search goes on
 over the scans that follow, and where there are many places, they are matched by turns.
 """
 
 import math
-from collections.abc import Callable
 from dataclasses import dataclass, field, replace
 
 import numpy as np
@@ -17,13 +16,16 @@ from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
 from slam.tracker.belief.config import RelocaliseConfig
-from slam.tracker.belief.evidence import Evidence
-from slam.tracker.belief.posterior import MOST_NATS
+from slam.tracker.belief.likelihood import told
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.matching.whole_search import WholeSearch
+
+
+ANEW = np.array([0.3, 0.35, 1.0])  # m, rad or s moved: another scan is as good as new; by hand
+LEAST = 1e-3  # share: numerical guard
 
 
 def spread(m: float, rad: float) -> Float:
@@ -46,21 +48,22 @@ def is_same(one: Match, other: Match) -> bool:
 class Place:
     """One where the robot may be.
 
-    match     of the latest scan that was matched there, carried on by odometry
-    evidence  of all scans that were
-    prior     nats of having slipped there; none: it cannot have
-    gain_m    mean of the trace that a scan confirms more from there than from where motion led
-    scans     that were matched there
-    unseen_s  s since a scan from there last confirmed more than may be by chance
-    waited    scans since it was matched, ``drift`` (3, 3) what odometry may be off since
+    match    of the latest scan that was matched there, carried on by odometry
+    nats     of all scans that were, for this place against none that is known
+    latest   nats of the latest of them
+    scans    that were matched there; ``way`` (3,) m, rad and s moved since the first of them
+    near     whether the robot may have slipped there, and need not have been carried
+    asked    (3,) m, rad and s moved since the latest
+    waited   scans since then, ``drift`` (3, 3) what odometry may be off since
     """
 
     match: Match
-    evidence: Evidence
-    prior: float = -MOST_NATS
-    gain_m: float = 0.0
+    nats: float = 0.0
+    latest: float = 0.0
     scans: int = 1
-    unseen_s: float = 0.0
+    way: Float = field(default_factory=lambda: np.zeros(3))
+    near: bool = False
+    asked: Float = field(default_factory=lambda: np.zeros(3))
     waited: int = 0
     drift: Float = field(default_factory=lambda: np.zeros((3, 3)))
 
@@ -74,7 +77,7 @@ class Place:
 class Places:
     """The places that are followed from one scan on, on a map that is not written meanwhile.
 
-    followed  with evidence, in no order
+    followed  in no order
     searches  of the whole map that were finished, all their places tried
     """
 
@@ -84,31 +87,23 @@ class Places:
         self._prices = matcher.config.matching.budget
         self.followed: list[Place] = []
         self.searches = 0
-        self._kept: list[tuple[Observations, Float]] = []  # earlier scans, and the motion since
         self._coarse: CoarseMap | None = None
         self._search: WholeSearch | None = None
         self._since_search_s = math.inf
         self._found: list[Float] = []  # by the search, to be tried
         self._motion, self._drift = np.zeros(3), np.zeros((3, 3))  # since the scan searched for
 
-    def remember(self, observations: Observations) -> None:
-        """Keep a scan for places that are found later; of too many, every second one goes."""
-        self._kept.append((observations, np.zeros(3)))
-        if len(self._kept) > self._config.kept:
-            self._kept = self._kept[::2]
-
-    def follow(
-        self, observations: Observations, prediction: Prediction, budget: Budget, here: Evidence
-    ) -> None:
-        """Follow all to the next scan; ``here``: of where motion led."""
+    def follow(self, observations: Observations, prediction: Prediction, budget: Budget) -> None:
+        """Follow all to the next scan."""
         self._go_on(prediction)
         left = (1.0 - self._prices.known_share) * budget.left_ns
         moved: dict[int, Place] = {}
         for place in sorted(self.followed, key=lambda place: -place.waited):
+            waiting = self._waiting(place, prediction)
             if moved and budget.left_ns <= left:
-                moved[id(place)] = self._waiting(place, prediction)
+                moved[id(place)] = waiting
             else:
-                moved[id(place)] = self._matched(place, observations, prediction, here, budget)
+                moved[id(place)] = self._matched(waiting, observations, budget)
         self.followed = [moved[id(place)] for place in self.followed]
 
     def explore(self, observations: Observations, budget: Budget) -> list[Place]:
@@ -122,7 +117,7 @@ class Places:
         self._go_on(prediction)
         self.followed = [self._waiting(place, prediction) for place in self.followed]
 
-    def keep(self, new: list[Place], weight: Callable[[Place], float], hopeless: float) -> None:
+    def keep(self, new: list[Place]) -> None:
         """Follow the best, one of each place, the likeliest; none that is hopeless.
 
         Of places at the same pose, the one that more scans were asked of.
@@ -132,12 +127,23 @@ class Places:
             if not any(is_same(place.match, other.match) for other in apart):
                 apart.append(place)
         kept: list[Place] = []
-        for place in sorted(apart, key=lambda one: -weight(one)):
+        for place in sorted(apart, key=lambda one: -one.nats):
             at = place.match.T_map_robot
             if not any(other.is_at(at, self._config) for other in kept):
                 kept.append(place)
-        best = weight(kept[0]) if kept else 0.0
-        self.followed = [one for one in kept if weight(one) >= best - hopeless][: self._config.most]
+        least = kept[0].nats - self._matcher.config.belief.hopeless if kept else 0.0
+        self.followed = [one for one in kept if one.nats >= least][: self._config.most]
+
+    def begun(self, match: Match, *, near: bool = False) -> Place:
+        """A place with what this scan says of it."""
+        config = self._matcher.config.belief
+        nats = self._told(match)
+        return Place(match=match, nats=nats if near else nats - config.best, latest=nats, near=near)
+
+    def _told(self, match: Match) -> float:
+        """Nats of a scan matched to the map, against a place that the map does not know."""
+        config, usual = self._matcher.config.belief, max(self._matcher.usual.match, LEAST)
+        return told(config, match.overlapped / usual) - config.new
 
     def _go_on(self, prediction: Prediction) -> None:
         """The robot has moved on since the scan that is searched for."""
@@ -146,9 +152,6 @@ class Places:
         step = turned(prediction.step, -tracked)
         self._drift = se2.propagate(self._drift, self._motion, prediction.increment, step)
         self._motion = se2.compose(self._motion, prediction.increment)
-        self._kept = [
-            (seen, se2.compose(motion, prediction.increment)) for seen, motion in self._kept
-        ]
 
     def _look_around(self, observations: Observations, budget: Budget) -> None:
         """Go on with the search of the whole map, or begin one for this scan."""
@@ -177,49 +180,17 @@ class Places:
             match = self._climb(observations, here, covariance, budget)
             few = min(len(observations.points_robot), self._matcher.numbers.climb.few)
             budget.spend(self._prices.approach_ns * few)
-            new.append(self.begun(observations, match, budget))
+            new.append(self.begun(match))
             self.searches += self._search is None and not self._found
         return new
 
-    def begun(
-        self,
-        observations: Observations,
-        match: Match,
-        budget: Budget,
-        before: Evidence | None = None,
-    ) -> Place:
-        """A place with what this scan says of it, and those before it: what was said ``before``
-        of where motion led, or else what kept scans say of where it came from.
-        """
-        evidence = Evidence() if before is None else before.copy()
-        for seen, motion in self._kept if before is None else ():
-            at = se2.compose(match.T_map_robot, se2.inverse(motion))
-            self._weigh(evidence, seen, at, budget)
-        self._weigh(evidence, observations, match.T_map_robot, budget)
-        return Place(match=match, evidence=evidence)
-
-    def _weigh(
-        self, evidence: Evidence, observations: Observations, T_map_robot: Float, budget: Budget
-    ) -> None:
-        look = evidence.add(self._cell_map, observations, T_map_robot)
-        budget.spend(self._prices.weigh_ns * look.visited)
-
-    def _matched(
-        self,
-        old: Place,
-        observations: Observations,
-        prediction: Prediction,
-        here: Evidence,
-        budget: Budget,
-    ) -> Place:
-        moved = self._waiting(old, prediction)
+    def _matched(self, moved: Place, observations: Observations, budget: Budget) -> Place:
+        """A scan says the less the less the robot has moved since the one before."""
         match = self._climb(observations, moved.match.T_map_robot, moved.drift, budget)
-        self._weigh(old.evidence, observations, match.T_map_robot, budget)
-        gain_m, scans = old.evidence.latest_m - here.latest_m, old.scans + 1
-        seen = old.evidence.latest_m >= self._matcher.config.belief.confirmed_m
+        latest = self._told(match)
         return replace(
-            moved, match=match, gain_m=old.gain_m + (gain_m - old.gain_m) / scans, scans=scans,
-            unseen_s=0.0 if seen else moved.unseen_s, waited=0, drift=np.zeros((3, 3)),
+            moved, match=match, nats=moved.nats + novelty(moved.asked) * latest, latest=latest,
+            scans=moved.scans + 1, asked=np.zeros(3), waited=0, drift=np.zeros((3, 3)),
         )  # fmt: skip
 
     def _waiting(self, old: Place, prediction: Prediction) -> Place:
@@ -231,8 +202,12 @@ class Places:
         else:
             drift = turned(prediction.step, float(before[2]) - tracked)
         match = replace(old.match, T_map_robot=se2.compose(before, increment))
-        unseen_s, waited = old.unseen_s + prediction.elapsed, old.waited + 1
-        return replace(old, match=match, unseen_s=unseen_s, waited=waited, drift=drift)
+        x, y, turn = increment.tolist()
+        moved = np.array([math.hypot(x, y), abs(turn), prediction.elapsed])
+        return replace(
+            old, match=match, way=old.way + moved, asked=old.asked + moved, waited=old.waited + 1,
+            drift=drift,
+        )  # fmt: skip
 
     def _climb(
         self, observations: Observations, T_map_robot: Float, covariance: Float, budget: Budget
@@ -241,3 +216,8 @@ class Places:
         start = self._matcher.approach(self._cell_map, observations, T_map_robot, covariance)
         precision = inverted(covariance)
         return self._matcher.climb(self._cell_map, observations, start, T_map_robot, precision)
+
+
+def novelty(moved: Float) -> float:
+    """Share of a scan that is new after having moved by (3,) m, rad and s."""
+    return min(float((moved / ANEW).max()), 1.0)

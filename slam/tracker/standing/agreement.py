@@ -65,6 +65,7 @@ class Agreement:
         """The robot was set elsewhere: what was summed says nothing of it."""
         self._sum, self._whole, self._variance = [0.0] * 3, [0.0] * 3, [0.0] * 6
         self._held, self._looks = [0.0] * 6, 0.0
+        self._way_m = self._turn_rad = 0.0
         self.ratio = self.denied = 0.0
         self._elapsed_s = 0.0
         self._put_back: Float = np.zeros((3, 3))
@@ -133,12 +134,21 @@ class Agreement:
         more = (xx, xy, xt, yy, yt, tt)
         V = [keep * keep * a + b for a, b in zip(self._variance, more, strict=True)]
         self._variance = V
+        x, y, turn = prediction.increment.tolist()
+        self._way_m = keep * self._way_m + math.hypot(x, y)
+        self._turn_rad = keep * self._turn_rad + abs(turn)
         self.ratio, self.denied = (self._form(sums, V) / 3.0 for sums in (S, self._whole))
 
     def _form(self, S: list[float], V: list[float]) -> float:
         """S' (V + R)^-1 S in a fixed order of operations; V by xx, xy, xt, yy, yt, tt."""
         (x, y, t), (xx, xy, xt, yy, yt, tt), (own_x, own_y, own_t) = S, V, self._own
-        a, b, c, d, e, f = upper_inverted(xx + own_x, xy, xt, yy + own_y, yt, tt + own_t)
+        m2, rad2 = (
+            (self._config.scale * moved) ** 2
+            for moved in (self._way_m, self._turn_rad)
+        )
+        a, b, c, d, e, f = upper_inverted(
+            xx + own_x + m2, xy, xt, yy + own_y + m2, yt, tt + own_t + rad2
+        )
         return x * (a * x + 2.0 * (b * y + c * t)) + y * (d * y + 2.0 * e * t) + f * t * t
 
     @property

@@ -58,6 +58,9 @@ class StandingConfig(Settings):
         SEEDS,
         low=1e-3,
     )
+    scale: float = number(
+        0.1, "share", "of way and of turn that odometry may be off by systematically", low=0.0
+    )
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
     alert_m: float = number(

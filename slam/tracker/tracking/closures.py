@@ -16,7 +16,6 @@ from slam.frames import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge
-from slam.tracker.belief.evidence import Evidence
 from slam.tracker.belief.places import coarse, spread
 from slam.tracker.cell_map import CellMap
 from slam.tracker.config import TrackerConfig
@@ -24,7 +23,7 @@ from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.matching.whole_search import WholeSearch
-from slam.tracker.rasterise import rasterise
+from slam.tracker.rasterise import rasterise, seen_at
 from slam.tracker.tracking.keys import KeyFrame
 from slam.tracker.uncertainty.covariances import carried, observable
 from slam.tracker.uncertainty.residuals import look
@@ -51,7 +50,7 @@ def support(cell_map: CellMap, observations: Observations, match: Match) -> floa
     The second factor distinguishes a corridor from the room beside it: there the beams pass where
     walls are known to be.
     """
-    look = Evidence().add(cell_map, observations, match.T_map_robot)
+    look = seen_at(cell_map, observations, match.T_map_robot)
     total = look.confirmed + look.contradicted
     return match.matched * look.confirmed / total if total > 0.0 else 0.0
 

@@ -8,23 +8,16 @@ class State(StrEnum):
     """What was done with a scan.
 
     TRACKING   the pose is believed, and the map was written
+    OUTDATED   the same, and what stood here on earlier days is gone (``slam.days`` says so)
     FROZEN     the pose is the likeliest, but not believed: the map was not written
-    LOST       another place is likelier
+    LOST       it is not even that
     RELOCATED  the robot was found at another place in this scan
     BLIND      the scan has not one return
     """
 
     TRACKING = "tracking"
+    OUTDATED = "map outdated here"
     FROZEN = "frozen"
     LOST = "lost"
     RELOCATED = "relocated"
-    BLIND = "blind"
-
-
-class Status(StrEnum):
-    """What may be wrong: nothing, the map in view, the pose, or there is nothing to see."""
-
-    TRACKING = "tracking"
-    OUTDATED = "map outdated here"
-    LOST = "lost"
     BLIND = "blind"
