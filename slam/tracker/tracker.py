@@ -213,11 +213,10 @@ class Tracker(abc.ABC):
     ) -> float:
         """Returns how far the matched returns are trusted, in [0, 1]."""
         match, prediction = judged.match, judged.prediction
-        agreement, dragged, now = self._standing.agreement, 0.0, None
+        agreement, now = self._standing.agreement, None
         if match.slipped:  # found by a search, among what does not fit there
             lasting = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
         else:
-            dragged = agreement.dragged()
             lasting, now = agreement.left_behind(), agreement.covariance()
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
         matched = match.tau > 0.0 and not match.slipped
@@ -233,7 +232,7 @@ class Tracker(abc.ABC):
             self._odometry_noise.learn(prediction, match, sigma_m, along_rad)
         else:
             self._odometry_noise.nis = None
-        return observations.mean_vote * (1.0 - dragged)
+        return observations.mean_vote
 
     def _add_to_path(self, observations: Observations, judged: Judged) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is uncertain."""
@@ -281,7 +280,6 @@ class Tracker(abc.ABC):
                 "unobservable_rad": sure.along_rad,
                 "nis": self._odometry_noise.nis,
                 "trust": trust,
-                "odometry_ratio": self._standing.agreement.ratio,
                 "p_lost": p_lost,
                 "correction": self._path.moved_by.tolist(),
                 "T_map_odom": self._path.T_map_odom.tolist(),

@@ -101,7 +101,8 @@ class Belief:
             return self._blind(cell_map, prediction)
         local = cell_map if doubt is None else doubt.local
         match = near(self._match(observations, prediction, local), prediction)
-        match = self._undragged(cell_map, observations, prediction, match)
+        if prediction.elapsed <= OFTEN_S:
+            self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
         share = self._matcher.usual.share(match, observations)
         nats = self._goes_on(cell_map, observations, match, share)
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_NATS)
@@ -117,34 +118,6 @@ class Belief:
         doubt = self._doubt = doubt or Doubt(cell_map, self._matcher)
         doubt.match = match
         return self._searched(doubt, observations, prediction, nats)
-
-    def _undragged(
-        self, cell_map: CellMap, observations: Observations, prediction: Prediction, match: Match
-    ) -> Match:
-        """The match, or where odometry leads if movers carried it off."""
-        if prediction.elapsed > OFTEN_S:
-            return match
-        self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
-        dragged = self._dragged(cell_map, observations, match)
-        if dragged <= 0.5:
-            return match
-        pose = self._agreement.undragged(match.T_map_robot, dragged)
-        return unmatched(pose, matched=match.matched, score=0.0)
-
-    def _dragged(self, cell_map: CellMap, observations: Observations, match: Match) -> float:
-        """How likely movers carried the match off, and not odometry: by the agreement, and by what
-        the map says of both poses."""
-        if not self._agreement.suspected:
-            return 0.0
-        dragged = min(max(self._agreement.dragged(), 0.5), 1.0 - 1e-12)
-        poses = match.T_map_robot, self._agreement.put_back(match.T_map_robot)
-        here, back = (seen_at(cell_map, observations, pose) for pose in poses)
-        nats = [
-            3.6 * math.log1p(min(look.known, 6.0) / 0.47) - 4.9 * math.sqrt(look.sure)
-            for look in (here, back)
-        ]
-        nats[1] += math.log(dragged / (1.0 - dragged))
-        return probabilities(nats)[1]
 
     def _goes_on(
         self, cell_map: CellMap, observations: Observations, match: Match, share: float

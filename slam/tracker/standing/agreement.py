@@ -57,26 +57,18 @@ class Agreement:
 
     def __init__(self, config: StandingConfig, pull: Pull = Pull()) -> None:  # noqa: B008 (frozen)
         self._config, self._pull = config, pull
-        own = (config.match_m, config.match_m, math.radians(config.match_deg))
-        self._own = [v * v for v in own]
         self.forget()
 
     def forget(self) -> None:
         """The robot was set elsewhere: what was summed says nothing of it."""
-        self._sum, self._whole, self._variance = [0.0] * 3, [0.0] * 3, [0.0] * 6
-        self._held, self._looks = [0.0] * 6, 0.0
-        self._way_m = self._turn_rad = 0.0
-        self.ratio = self.denied = 0.0
-        self._elapsed_s = 0.0
-        self._put_back: Float = np.zeros((3, 3))
+        self._sum, self._held = [0.0] * 3, [0.0] * 6
+        self._looks = self._elapsed_s = 0.0
 
     def turned(self, by: float) -> None:
         """The map frame was turned by ``by`` rad, and the robot with it."""
         c, s = math.cos(by), math.sin(by)
-        self._sum, self._whole = (
-            [c * x - s * y, s * x + c * y, t] for x, y, t in (self._sum, self._whole)
-        )
-        self._variance, self._held = _turned(self._variance, by), _turned(self._held, by)
+        x, y, turn = self._sum
+        self._sum, self._held = [c * x - s * y, s * x + c * y, turn], _turned(self._held, by)
 
     def hold(self, old: Float, elapsed_s: float) -> None:
         """A scan shows so much old surface: (6,) xx, xy, xt, yy, yt, tt about the robot."""
@@ -126,90 +118,27 @@ class Agreement:
         """
         off = prediction.off(T_map_robot)
         pulled = self._left_to_movers(vote, off, in_doubt)
-        (xx, xy, xt), (_, yy, yt), (_, _, tt) = prediction.covariance.tolist()
         self._elapsed_s = prediction.elapsed
         keep = math.exp(-prediction.elapsed / self._config.window_s)
-        S = self._sum = [keep * a + b for a, b in zip(self._sum, pulled, strict=True)]
-        self._whole = [keep * a + b for a, b in zip(self._whole, off.tolist(), strict=True)]
-        more = (xx, xy, xt, yy, yt, tt)
-        V = [keep * keep * a + b for a, b in zip(self._variance, more, strict=True)]
-        self._variance = V
-        x, y, turn = prediction.increment.tolist()
-        self._way_m = keep * self._way_m + math.hypot(x, y)
-        self._turn_rad = keep * self._turn_rad + abs(turn)
-        self.ratio, self.denied = (self._form(sums, V) / 3.0 for sums in (S, self._whole))
-
-    def _form(self, S: list[float], V: list[float]) -> float:
-        """S' (V + R)^-1 S in a fixed order of operations; V by xx, xy, xt, yy, yt, tt."""
-        (x, y, t), (xx, xy, xt, yy, yt, tt), (own_x, own_y, own_t) = S, V, self._own
-        m2, rad2 = (
-            (self._config.scale * moved) ** 2
-            for moved in (self._way_m, self._turn_rad)
-        )
-        a, b, c, d, e, f = upper_inverted(
-            xx + own_x + m2, xy, xt, yy + own_y + m2, yt, tt + own_t + rad2
-        )
-        return x * (a * x + 2.0 * (b * y + c * t)) + y * (d * y + 2.0 * e * t) + f * t * t
-
-    @property
-    def own(self) -> Float:
-        """(3, 3) R, what a match itself may be off."""
-        return np.diag(self._own)
-
-    @property
-    def suspected(self) -> bool:
-        """Whether odometry denies the corrections of the window, whoever made them.
-
-        Where scans come more seldom than a window there is but one, which is no sum.
-        """
-        often = self._elapsed_s <= self._config.window_s
-        return self.dragged() > 0.5 or (often and 0.0 < self._config.disagreed < self.denied)
-
-    def dragged(self) -> float:
-        """Probability in [0, 1) that the matches are wrong, and not odometry."""
-        if self._config.disagreed == 0.0:
-            return 0.0
-        nats = min(1.5 * (self.ratio - self._config.disagreed), 50.0)  # of 3 numbers: 3 / 2
-        return 1.0 / (1.0 + math.exp(-nats))
+        self._sum = [keep * a + b for a, b in zip(self._sum, pulled, strict=True)]
 
     @property
     def by_movers(self) -> Float:
         """(3,) S: what movers may have made of the corrections of the window."""
         return np.array(self._sum)
 
-    def put_back(self, T_map_robot: Float) -> Float:
-        """(3,) the pose without the corrections of the window: where odometry leads."""
-        pose: Float = T_map_robot - np.array(self._whole)
-        pose[2] = se2.wrap(float(pose[2]))
-        return pose
-
-    def undragged(self, T_map_robot: Float, dragged: float) -> Float:
-        """(3,) the pose put back, from which the sums begin anew; ``dragged``: how likely it is.
-
-        With the rest of the probability the matches were right: the pose is off by F now, and
-        ``left_behind`` says so.
-        """
-        pose = self.put_back(T_map_robot)
-        put_back = dragged * (1.0 - dragged) * np.multiply.outer(self._whole, self._whole)
-        held, looks = self._held, self._looks
-        self.forget()
-        self._put_back, self._held, self._looks = put_back, held, looks
-        return pose
-
     def covariance(self) -> Float:
         """(3, 3) of the pose by what movers may have made of its corrections: S S'."""
-        if self._config.disagreed == 0.0:
-            return np.zeros((3, 3))
         return np.multiply.outer(self._sum, self._sum)
 
     def left_behind(self) -> Float:
         """(3, 3) the part of that which the window is about to forget: the map's from now on.
 
-        What a pose put back leaves is in it. It is handed over once, until the next match.
+        It is handed over once, until the next match.
         """
         keep = math.exp(-self._elapsed_s / self._config.window_s)
-        left = (1.0 - keep * keep) * self.covariance() + self._put_back
-        self._elapsed_s, self._put_back = 0.0, np.zeros((3, 3))
+        left = (1.0 - keep * keep) * self.covariance()
+        self._elapsed_s = 0.0
         return left
 
 

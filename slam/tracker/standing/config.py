@@ -46,11 +46,6 @@ class StandingConfig(Settings):
     thin_m: float = number(
         0.1, "m", "narrower things keep their weight: earlier beams may have missed them", SEEDS
     )
-    disagreed: float = number(
-        3.0, "ratio", "of what movers may have made of corrections over what odometry may be off, "
-        "squared, at which they are as likely as not; of all corrections: the map is asked; 0: "
-        "never asked", SEEDS,
-    )  # fmt: skip
     window_s: float = number(
         2.0,
         "s",
@@ -58,15 +53,10 @@ class StandingConfig(Settings):
         SEEDS,
         low=1e-3,
     )
-    scale: float = number(
-        0.1, "share", "of way and of turn that odometry may be off by systematically", low=0.0
-    )
-    match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
-    match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
     alert_m: float = number(
         0.5, "m", "a position off by more is wrong: the probability that movers carried it so far "
         "is part of p_lost; 0: never asked", "the alert limit of docs/integrity.md",
     )  # fmt: skip
 
 
-ALL_VOTE = StandingConfig(settled_s=0.0, disagreed=0.0)  # every return
+ALL_VOTE = StandingConfig(settled_s=0.0)  # every return
