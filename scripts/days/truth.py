@@ -27,7 +27,7 @@ from slam.days.evidence import Snapshot
 from slam.days.history import dense
 from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float
-from slam.tracker.belief.status import Status
+from slam.tracker.belief.state import State
 
 STILL_M, STILL_RAD = 0.1, 0.15  # of its commonest pose, a thing stands still there
 STILL_SHARE = 0.6  # of the scans at which it must; else it has no place in that session
@@ -349,7 +349,7 @@ def verdicts(estimates: Sequence[Estimate], shares: Float, first: int) -> dict[s
     """From scan ``first`` on: how often "map outdated here" is said where the room clearly changed,
     and where it hardly did; None without such scans.
     """
-    said = np.array([e.diagnostics.get("verdict") == Status.OUTDATED for e in estimates])[first:]
+    said = np.array([e.diagnostics.get("state") == State.OUTDATED for e in estimates])[first:]
     shares = shares[first:]
     clearly, hardly = shares >= CLEARLY, shares < HARDLY
     return {

@@ -184,9 +184,9 @@ def small_map(track: Track) -> Raster | None:
 
 
 def verdict_of(estimate: Estimate) -> str:
-    """What a SLAM says of itself: tracking, map outdated here, lost; or not sure."""
+    """What a SLAM says of itself: tracking, map outdated here, frozen, lost; or not sure."""
     usual = "tracking" if estimate.converged else "not sure"
-    return str(estimate.diagnostics.get("verdict", usual))
+    return str(estimate.diagnostics.get("state", usual))
 
 
 def claims(covariance: Float) -> tuple[float, float]:

@@ -3,8 +3,8 @@
 
 The robot maps on its own, in a frame that begins where it stands, while the known map is searched
 for what it sees. Each place that is found is followed, and weighed as a robot that was carried
-weighs places (``slam.tracker.belief``): by what all scans since the start confirm of the long-known
-map and what they see through. Nothing is written to the known map meanwhile.
+weighs places (``slam.tracker.belief``): by how much of all scans since the start the map explains.
+Nothing is written to the known map meanwhile.
 
 A session fits the days before where what always stands stands again: of the places where something
 stood in nearly every session before and that this one looked at, the share that it found empty; of
@@ -27,13 +27,11 @@ from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Float, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
-from slam.tracker.belief.config import LENIENT
-from slam.tracker.belief.evidence import Evidence
-from slam.tracker.belief.places import Place, Places, coarse, spread
-from slam.tracker.belief.posterior import Odds, probabilities
-from slam.tracker.belief.status import State
+from slam.tracker.belief.likelihood import probabilities
+from slam.tracker.belief.places import Place, Places, coarse, novelty, spread
+from slam.tracker.belief.state import State
 from slam.tracker.matching.budget import Budget
-from slam.tracker.matching.matcher import Matcher
+from slam.tracker.matching.matcher import Matcher, unmatched
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
 
@@ -44,6 +42,9 @@ BUFFER = 200  # scans, kept to be merged when the place is found
 BUFFER_M, BUFFER_RAD = 0.1, 0.15  # m driven or rad turned between two of them
 ASKED = 20  # scans of those kept, evenly taken, that a place found late is asked for
 AGREED = 0.75  # share of the usual match, in a map without days, of those asked
+NOWHERE = unmatched(se2.IDENTITY, matched=0.0, score=0.0)  # motion led to no place of the map
+KEPT_ANEW = novelty(np.array([BUFFER_M, BUFFER_RAD, 0.0]))  # of such a scan
+SURE = 0.9  # probability of one place: what it saw must fit the days before, too
 FITS = 0.5  # share of the scans after the find that must be tracked
 # Whether a session fits the days before; set by hand.
 ALWAYS = 0.7  # share of the looks of all sessions: always stands
@@ -152,7 +153,7 @@ class Kept:
     elapsed: float
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(kw_only=True, eq=False)
 class Late:
     """A place that was found late: it is weighed when the scans before have been asked, too."""
 
@@ -185,8 +186,6 @@ class StartSearch:
         self._known, self._past = known, past
         numbers = known.config
         self._belief, self._budget = numbers.belief, numbers.matching.budget
-        self._odds = Odds(numbers.belief, numbers.carried_per_h, changed=True)
-        self._prior = -numbers.belief.place - numbers.belief.outdated
         self.seen: list[tuple[Frame, Float]] = []
         self.alone = type(known)(numbers)
         self.alone.hold_map()
@@ -228,7 +227,7 @@ class StartSearch:
             elapsed=elapsed,
         )
         budget = Budget(self._budget, self._budget.lost_share)
-        self._places.follow(observations, prediction, budget, Evidence())
+        self._places.follow(observations, prediction, budget, NOWHERE)
         for place in self._places.explore(observations, budget):
             self._join(place, pose)
         self._ask(pose)
@@ -248,35 +247,32 @@ class StartSearch:
 
     def _ask(self, pose: Float) -> None:
         """Ask the scans before of the places that were found late, some in each scan."""
-        left = ASKED
+        left, covariance = ASKED, coarse(self._known.config.tracking.relocalise)
         while self._late and left > 0:
             late = self._late[0]
             now, late.unasked[-left:] = late.unasked[-left:], []
             left -= max(len(now), 1)
             for one in now:
                 at = se2.compose(late.T_map_own, one.T_own_robot)
-                late.place.evidence.add(self._known.cell_map, one.observations, at)
+                match = self._known.matched(one.observations, at, covariance)
+                nats = KEPT_ANEW * self._places.told(match)
+                late.place = replace(late.place, nats=late.place.nats + nats)
             if not late.unasked:
                 self._late.pop(0)
                 self._weigh(late, pose)
 
     def _weigh(self, late: Late, pose: Float) -> None:
         """All scans were asked: it is followed as the others are, if it is not hopeless."""
-        hopeless = self._belief.hopeless
-        self._places.keep([late.at(pose)], self._weight, hopeless)
-        best = self._weight(self._places.followed[0])
-        if self._weight(late.place) < best - hopeless:
+        self._places.keep([late.at(pose)])
+        best = self._places.followed[0].nats
+        if late.place.nats < best - self._belief.hopeless:
             self._hopeless.append(late.T_map_own)
             del self._hopeless[:-BUFFER]
-
-    def _weight(self, place: Place) -> float:
-        """Nats of having begun there, against outside the map; as of any place that is found."""
-        return self._odds.evidence(place.evidence) + self._prior
 
     def starts(self) -> list[Start]:
         """Where it may have begun, in no order; what is left of 1: outside the map."""
         followed = self._places.followed
-        shares = probabilities([*map(self._weight, followed), 0.0])
+        shares = probabilities([*(place.nats for place in followed), 0.0])
         assert self._before is not None or not followed
         own = np.zeros(3) if self._before is None else se2.inverse(self._before[1])
         return [
@@ -288,9 +284,8 @@ class StartSearch:
         """T_map_own (3,), where one place is certain, and no other is still to be asked."""
         if self._late or not self._places.searches:
             return None
-        sure = 1.0 - LENIENT * self._belief.frozen_above
         for place, start in zip(self._places.followed, self.starts(), strict=True):
-            if place.waited == 0 and start.probability >= sure:
+            if place.waited == 0 and start.probability >= SURE:
                 return start.T_map_own if self._fits(start.T_map_own) else None
         return None
 

@@ -24,7 +24,7 @@ from slam.frames import Float, Frame, to_s
 from slam.path import PosePath
 from slam.tracker import map_file
 from slam.tracker.belief.places import coarse
-from slam.tracker.belief.status import Status
+from slam.tracker.belief.state import State
 from slam.tracker.tracker import Tracker
 from slam.trajectory import Trajectory
 
@@ -110,7 +110,7 @@ class Session:
         """As a ``SlamSystem``'s. While the start is searched for, poses are in the session's own
         frame, ``converged`` is False and ``diagnostics["state"]`` is "searching". In a map with
         days, "news" is the share of the returns that they did not know (``history.News``), and
-        "verdict" is "map outdated here" where that is much.
+        "state" is "map outdated here" where that is much.
         """
         if self._search is not None:
             return self._look(self._search, frame)
@@ -166,8 +166,8 @@ class Session:
             self._told = self._news.share(frame, estimate.T_map_robot)
             self._asked_ns = frame.stamp_ns
         found = {**estimate.diagnostics, "news": self._told}
-        if found.get("verdict") == Status.TRACKING and self._told >= OUTDATED:
-            found["verdict"] = Status.OUTDATED.value
+        if self._state == State.TRACKING and self._told >= OUTDATED:
+            found["state"] = State.OUTDATED.value
         return replace(estimate, diagnostics=found)
 
     @property

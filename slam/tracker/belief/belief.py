@@ -109,7 +109,8 @@ class Belief:
         if nats >= 0.0:
             self._matcher.usual.follow(match, observations, prediction.elapsed)
         else:  # by odometry: what it was matched to says nothing
-            match = unmatched(prediction.T_map_robot, matched=match.matched, score=0.0)
+            by_odometry = unmatched(prediction.T_map_robot, matched=match.matched, score=0.0)
+            match = replace(by_odometry, overlapped=match.overlapped)
         odd = per_h > 0.0 and share < config.tracking.relocalise.goes_on
         self._weigh([] if doubt is None else doubt.places.followed)
         frozen = nats < 0.0 or self.p_lost > config.belief.frozen_above
@@ -162,7 +163,8 @@ class Belief:
 
     def _weigh(self, places: list[Place]) -> list[float]:
         """Probabilities of these places, against where motion led and any other. Sets ``p_lost``."""
-        weights = [0.0, self._unknown, *(self._unknown + place.nats for place in places)]
+        weights = [0.0, self._unknown]
+        weights += [place.nats + (0.0 if place.near else self._unknown) for place in places]
         of_motion, _, *others = probabilities(weights)
         self.p_lost = max(0.0, 1.0 - of_motion)
         return others
@@ -174,7 +176,7 @@ class Belief:
         config, everyone = self._matcher.config, observations.with_votes(None)
         prices = config.matching.budget
         budget = Budget(prices, prices.lost_share if self.p_lost > 0.5 else prices.frozen_share)
-        doubt.places.follow(everyone, prediction, budget)
+        doubt.places.follow(everyone, prediction, budget, doubt.match)
         new = self._nearby(doubt, everyone, prediction, budget)
         if self.p_lost > config.belief.frozen_above:
             new += doubt.places.explore(everyone, budget)
@@ -216,7 +218,7 @@ class Belief:
         found = self._matcher.climb(doubt.cell_map, everyone, found.T_map_robot, start, loose)
         if is_same(found, doubt.match):
             return []
-        return [doubt.places.begun(found, near=True)]
+        return [doubt.places.begun(found, doubt.match)]
 
     def _is_better(self, doubt: Doubt, place: Place, everyone: Observations) -> bool:
         """Whether a place may be taken: one nearby at once, one far away after scans that are new.

@@ -23,6 +23,10 @@ class BeliefConfig(Settings):
     best: float = number(
         1.6, "nats", "less for one found in the whole map: the best of all is better than any one"
     )
+    slips: float = number(
+        0.01, "probability", "of a slip that odometry does not know, in one scan", low=1e-9,
+        high=0.5,
+    )  # fmt: skip
     hidden: float = number(
         8.0, "nats/m", "most against where motion led, by the long-known surface that a scan sees "
         "through: what is hidden denies nothing",

@@ -49,7 +49,8 @@ class Place:
     """One where the robot may be.
 
     match    of the latest scan that was matched there, carried on by odometry
-    nats     of all scans that were, for this place against none that is known
+    nats     of all scans that were, for this place against none that is known; for one nearby,
+             against where motion led
     latest   nats of the latest of them
     scans    that were matched there; ``way`` (3,) m, rad and s moved since the first of them
     near     whether the robot may have slipped there, and need not have been carried
@@ -93,8 +94,10 @@ class Places:
         self._found: list[Float] = []  # by the search, to be tried
         self._motion, self._drift = np.zeros(3), np.zeros((3, 3))  # since the scan searched for
 
-    def follow(self, observations: Observations, prediction: Prediction, budget: Budget) -> None:
-        """Follow all to the next scan."""
+    def follow(
+        self, observations: Observations, prediction: Prediction, budget: Budget, here: Match
+    ) -> None:
+        """Follow all to the next scan; ``here``: its match where motion led."""
         self._go_on(prediction)
         left = (1.0 - self._prices.known_share) * budget.left_ns
         moved: dict[int, Place] = {}
@@ -103,7 +106,7 @@ class Places:
             if moved and budget.left_ns <= left:
                 moved[id(place)] = waiting
             else:
-                moved[id(place)] = self._matched(waiting, observations, budget)
+                moved[id(place)] = self._matched(waiting, observations, budget, here)
         self.followed = [moved[id(place)] for place in self.followed]
 
     def explore(self, observations: Observations, budget: Budget) -> list[Place]:
@@ -134,13 +137,15 @@ class Places:
         least = kept[0].nats - self._matcher.config.belief.hopeless if kept else 0.0
         self.followed = [one for one in kept if one.nats >= least][: self._config.most]
 
-    def begun(self, match: Match, *, near: bool = False) -> Place:
-        """A place with what this scan says of it."""
-        config = self._matcher.config.belief
-        nats = self._told(match)
-        return Place(match=match, nats=nats if near else nats - config.best, latest=nats, near=near)
+    def begun(self, match: Match, here: Match | None = None) -> Place:
+        """A place with what this scan says of it; ``here``: nearby, against where motion led."""
+        config, nats = self._matcher.config.belief, self.told(match)
+        if here is None:
+            return Place(match=match, nats=nats - config.best, latest=nats)
+        nats -= self.told(here)
+        return Place(match=match, nats=nats + math.log(config.slips), latest=nats, near=True)
 
-    def _told(self, match: Match) -> float:
+    def told(self, match: Match) -> float:
         """Nats of a scan matched to the map, against a place that the map does not know."""
         config, usual = self._matcher.config.belief, max(self._matcher.usual.match, LEAST)
         return told(config, match.overlapped / usual) - config.new
@@ -184,10 +189,12 @@ class Places:
             self.searches += self._search is None and not self._found
         return new
 
-    def _matched(self, moved: Place, observations: Observations, budget: Budget) -> Place:
+    def _matched(
+        self, moved: Place, observations: Observations, budget: Budget, here: Match
+    ) -> Place:
         """A scan says the less the less the robot has moved since the one before."""
         match = self._climb(observations, moved.match.T_map_robot, moved.drift, budget)
-        latest = self._told(match)
+        latest = self.told(match) - (self.told(here) if moved.near else 0.0)
         return replace(
             moved, match=match, nats=moved.nats + novelty(moved.asked) * latest, latest=latest,
             scans=moved.scans + 1, asked=np.zeros(3), waited=0, drift=np.zeros((3, 3)),

@@ -166,7 +166,7 @@ class Standing:
             room.lasers, room.limits, room.ages_s, room.points, room.counts,
             (len(asked), config.came_s, config.left_s), asking, room.scratch, room.bins, out,
         )  # fmt: skip
-        return seen.with_votes(out ** float(__import__("os").environ.get("VP","1")), in_view)
+        return seen.with_votes(out, in_view)
 
 
 def whole_ns(seconds: float) -> int:
