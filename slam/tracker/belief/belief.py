@@ -103,6 +103,7 @@ class Belief:
         match = near(self._match(observations, prediction, local), prediction)
         if prediction.elapsed <= OFTEN_S:
             self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
+            match = self._undragged(cell_map, observations, match)
         share = self._matcher.usual.share(match, observations)
         nats = self._goes_on(cell_map, observations, match, share)
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_NATS)
@@ -119,6 +120,27 @@ class Belief:
         doubt = self._doubt = doubt or Doubt(cell_map, self._matcher)
         doubt.match = match
         return self._searched(doubt, observations, prediction, nats)
+
+    def _undragged(self, cell_map: CellMap, observations: Observations, match: Match) -> Match:
+        """The match, or where odometry leads: movers carry off what odometry denies, and what does
+        not explain clearly more of what is long known.
+        """
+        config, agreement = self._matcher.config, self._agreement
+        if not 0.0 < config.standing.disagreed < agreement.denied:
+            return match
+        old = cell_map if self._doubt is None else self._doubt.cell_map
+        back = agreement.put_back(match.T_map_robot)
+        if self._gain_m(old, observations, match.T_map_robot, back) >= config.belief.more_m:
+            return match
+        agreement.give_way()
+        return replace(unmatched(back, matched=match.matched, score=0.0), overlapped=match.overlapped)
+
+    @staticmethod
+    def _gain_m(cell_map: CellMap, observations: Observations, one: Float, other: Float) -> float:
+        """m of long-known surface that one pose explains more than another: confirmed less seen
+        through."""
+        there, here = (seen_at(cell_map, observations, pose) for pose in (one, other))
+        return (there.known - there.through) - (here.known - here.through)
 
     def _goes_on(
         self, cell_map: CellMap, observations: Observations, match: Match, share: float
@@ -233,8 +255,7 @@ class Belief:
             if not asked or self._unknown <= 0.0:
                 return False
         poses = place.match.T_map_robot, doubt.match.T_map_robot
-        there, here = (seen_at(doubt.cell_map, everyone, pose) for pose in poses)
-        return (there.known - there.through) - (here.known - here.through) >= config.more_m
+        return self._gain_m(doubt.cell_map, everyone, *poses) >= config.more_m
 
     def _taken(self, doubt: Doubt, place: Place, prediction: Prediction) -> Judged:
         """The robot is there."""

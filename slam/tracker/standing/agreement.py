@@ -14,7 +14,7 @@ import numpy as np
 
 from slam import se2
 from slam.frames import Float
-from slam.frontend.odometry_prior import Prediction, inverted, turned, upper_inverted
+from slam.frontend.odometry_prior import Prediction, inverted, squared, turned, upper_inverted
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.uncertainty.covariances import carried
 
@@ -63,12 +63,20 @@ class Agreement:
         """The robot was set elsewhere: what was summed says nothing of it."""
         self._sum, self._held = [0.0] * 3, [0.0] * 6
         self._looks = self._elapsed_s = 0.0
+        self._forget_window()
+
+    def _forget_window(self) -> None:
+        self._whole, self._variance = np.zeros(3), np.zeros((3, 3))
+        self._way_m = self._turn_rad = 0.0
 
     def turned(self, by: float) -> None:
         """The map frame was turned by ``by`` rad, and the robot with it."""
         c, s = math.cos(by), math.sin(by)
         x, y, turn = self._sum
         self._sum, self._held = [c * x - s * y, s * x + c * y, turn], _turned(self._held, by)
+        x, y, turn = self._whole.tolist()
+        self._whole = np.array([c * x - s * y, s * x + c * y, turn])
+        self._variance = turned(self._variance, by)
 
     def hold(self, old: Float, elapsed_s: float) -> None:
         """A scan shows so much old surface: (6,) xx, xy, xt, yy, yt, tt about the robot."""
@@ -121,6 +129,30 @@ class Agreement:
         self._elapsed_s = prediction.elapsed
         keep = math.exp(-prediction.elapsed / self._config.window_s)
         self._sum = [keep * a + b for a, b in zip(self._sum, pulled, strict=True)]
+        x, y, turn = prediction.increment.tolist()
+        self._whole = keep * self._whole + off
+        self._variance = keep * keep * self._variance + prediction.covariance
+        self._way_m = keep * self._way_m + math.hypot(x, y)
+        self._turn_rad = keep * self._turn_rad + abs(turn)
+
+    @property
+    def denied(self) -> float:
+        """F' (V + R)^-1 F / 3: what odometry says of the corrections of the window."""
+        m, rad = self._config.scale * self._way_m, self._config.scale * self._turn_rad
+        own_m, own_rad = self._config.match_m, math.radians(self._config.match_deg)
+        own = np.diag([own_m**2 + m**2, own_m**2 + m**2, own_rad**2 + rad**2])
+        return squared(self._whole, self._variance + own) / 3.0
+
+    def put_back(self, T_map_robot: Float) -> Float:
+        """(3,) the pose without the corrections of the window: where odometry leads."""
+        pose: Float = T_map_robot - self._whole
+        pose[2] = se2.wrap(float(pose[2]))
+        return pose
+
+    def give_way(self) -> None:
+        """The pose was put back: the window begins anew."""
+        self._forget_window()
+        self._sum = [0.0] * 3
 
     @property
     def by_movers(self) -> Float:
