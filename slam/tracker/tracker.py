@@ -213,16 +213,15 @@ class Tracker(abc.ABC):
     ) -> float:
         """Returns how far the matched returns are trusted, in [0, 1]."""
         match, prediction = judged.match, judged.prediction
-        agreement, now = self._standing.agreement, None
+        agreement = self._standing.agreement
+        lasting = agreement.left_behind()
         if match.slipped:  # found by a search, among what does not fit there
             lasting = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
-        else:
-            lasting, now = agreement.left_behind(), agreement.covariance()
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
         matched = match.tau > 0.0 and not match.slipped
         if evidence is not None and matched:
             self._pose_covariance.held(agreement.shown, evidence.old_off_m2, prediction.elapsed)
-        self._pose_covariance.dragged(lasting, now)
+        self._pose_covariance.dragged(lasting)
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
             self._odometry_noise.note_slip(prediction, match)
         else:

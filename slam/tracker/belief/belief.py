@@ -102,7 +102,7 @@ class Belief:
         local = cell_map if doubt is None else doubt.local
         match = near(self._match(observations, prediction, local), prediction)
         if prediction.elapsed <= OFTEN_S:
-            self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
+            self._agreement.take(prediction, match.T_map_robot)
             match = self._undragged(cell_map, observations, match)
         share = self._matcher.usual.share(match, observations)
         nats = self._goes_on(cell_map, observations, match, share)
@@ -129,10 +129,10 @@ class Belief:
         if not 0.0 < config.standing.disagreed < agreement.denied:
             return match
         old = cell_map if self._doubt is None else self._doubt.cell_map
-        back = agreement.put_back(match.T_map_robot)
+        back = agreement.led(match.T_map_robot)
         if self._gain_m(old, observations, match.T_map_robot, back) >= config.belief.more_m:
             return match
-        agreement.give_way()
+        agreement.put_back()
         return replace(unmatched(back, matched=match.matched, score=0.0), overlapped=match.overlapped)
 
     @staticmethod

@@ -54,7 +54,7 @@ class StandingConfig(Settings):
         low=1e-3,
     )
     disagreed: float = number(
-        3.0, "ratio", "of corrections over what odometry may be off, squared: above, a match must "
+        5.0, "ratio", "of corrections over what odometry may be off, squared: above, a match must "
         "explain clearly more of the map than where odometry leads; 0: never asked", SEEDS,
     )  # fmt: skip
     scale: float = number(0.1, "share", "of way and turn that odometry may be off by in a window")

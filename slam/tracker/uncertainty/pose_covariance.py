@@ -149,18 +149,13 @@ class PoseCovariance:
         faded = math.exp(-elapsed / config.view_s)
         self.unseen_s = self.unseen_s + elapsed if self.unobservable else self.unseen_s * faded
 
-    def dragged(self, covariance: Float, now: Float | None = None) -> None:
-        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot.
-
-        ``now``: (3, 3) that the pose alone is off by more, until the next frame.
-        """
+    def dragged(self, covariance: Float) -> None:
+        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot."""
         self._drift = self._drift + covariance
         self.newest_drift = self.newest_drift + covariance
         self.covariance = self.covariance + covariance
         self._by_movers = self._by_movers + covariance
-        if now is not None:
-            self.covariance = self.covariance + now
-        self.by_movers_m = _far(self._by_movers if now is None else self._by_movers + now)
+        self.by_movers_m = _far(self._by_movers)
         least = min(self._alert_m, self.by_movers_m)
         deviations = self._alert_m / self.by_movers_m if least > 0.0 else math.inf
         along = math.erfc(math.sqrt(0.5) * deviations)
