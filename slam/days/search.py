@@ -31,7 +31,7 @@ from slam.tracker.belief.likelihood import probabilities
 from slam.tracker.belief.places import Place, Places, coarse, novelty, spread
 from slam.tracker.belief.state import State
 from slam.tracker.matching.budget import Budget
-from slam.tracker.matching.matcher import Matcher, unmatched
+from slam.tracker.matching.matcher import Matcher
 from slam.tracker.rasterise import rasterise
 from slam.tracker.tracker import Tracker
 
@@ -42,7 +42,6 @@ BUFFER = 200  # scans, kept to be merged when the place is found
 BUFFER_M, BUFFER_RAD = 0.1, 0.15  # m driven or rad turned between two of them
 ASKED = 20  # scans of those kept, evenly taken, that a place found late is asked for
 AGREED = 0.75  # share of the usual match, in a map without days, of those asked
-NOWHERE = unmatched(se2.IDENTITY, matched=0.0, score=0.0)  # motion led to no place of the map
 KEPT_ANEW = novelty(np.array([BUFFER_M, BUFFER_RAD, 0.0]))  # of such a scan
 SURE = 0.9  # probability of one place: what it saw must fit the days before, too
 FITS = 0.5  # share of the scans after the find that must be tracked
@@ -227,7 +226,7 @@ class StartSearch:
             elapsed=elapsed,
         )
         budget = Budget(self._budget, self._budget.lost_share)
-        self._places.follow(observations, prediction, budget, NOWHERE)
+        self._places.follow(observations, prediction, budget)
         for place in self._places.explore(observations, budget):
             self._join(place, pose)
         self._ask(pose)

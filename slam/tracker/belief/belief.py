@@ -19,7 +19,7 @@ from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.belief.doubt import Doubt
 from slam.tracker.belief.likelihood import MOST_NATS, carried, probabilities, sum_of, told
-from slam.tracker.belief.places import Place, coarse, is_same, novelty
+from slam.tracker.belief.places import Place, novelty, spread
 from slam.tracker.belief.state import State
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.budget import Budget
@@ -185,8 +185,7 @@ class Belief:
 
     def _weigh(self, places: list[Place]) -> list[float]:
         """Probabilities of these places, against where motion led and any other. Sets ``p_lost``."""
-        weights = [0.0, self._unknown]
-        weights += [place.nats + (0.0 if place.near else self._unknown) for place in places]
+        weights = [0.0, self._unknown, *(self._unknown + place.nats for place in places)]
         of_motion, _, *others = probabilities(weights)
         self.p_lost = max(0.0, 1.0 - of_motion)
         return others
@@ -196,18 +195,19 @@ class Belief:
     ) -> Judged:
         """Other places are asked, and one is taken if it is certain."""
         config, everyone = self._matcher.config, observations.with_votes(None)
-        prices = config.matching.budget
+        prices, frozen_above = config.matching.budget, config.belief.frozen_above
         budget = Budget(prices, prices.lost_share if self.p_lost > 0.5 else prices.frozen_share)
-        doubt.places.follow(everyone, prediction, budget, doubt.match)
-        new = self._nearby(doubt, everyone, prediction, budget)
-        if self.p_lost > config.belief.frozen_above:
-            new += doubt.places.explore(everyone, budget)
-        doubt.places.keep(new)
+        doubt.places.follow(everyone, prediction, budget)
+        found = self._nearby(doubt, everyone, prediction, budget)
+        if found is not None and self._is_slip(doubt, found, everyone):
+            return self._slipped(doubt, found, prediction)
+        if self.p_lost > frozen_above:
+            doubt.places.keep(doubt.places.explore(everyone, budget))
         shares = self._weigh(doubt.places.followed)
         for place, p in zip(doubt.places.followed, shares, strict=True):
-            if p >= 1.0 - config.belief.frozen_above and self._is_better(doubt, place, everyone):
-                return self._taken(doubt, place, prediction)
-        if nats >= 0.0 and self.p_lost <= config.belief.frozen_above:
+            if p >= 1.0 - frozen_above and self._is_certain(doubt, place, everyone):
+                return self._relocated(doubt, place, prediction)
+        if nats >= 0.0 and self.p_lost <= frozen_above:
             return self._settled(doubt.local, doubt.match, prediction)
         if nats >= 0.0:
             doubt.write(observations, doubt.match.T_map_robot, prediction.elapsed)
@@ -219,59 +219,69 @@ class Belief:
 
     def _nearby(
         self, doubt: Doubt, everyone: Observations, prediction: Prediction, budget: Budget
-    ) -> list[Place]:
+    ) -> Match | None:
         """The best place as far around as a slip may have led."""
         numbers = self._matcher.config.tracking.relocalise
         doubt.since_near_s += prediction.elapsed
         if doubt.since_near_s < numbers.again_near_s or everyone.weight < numbers.least_near:
-            return []
+            return None
         doubt.since_near_s, self.busy = 0.0, max(self.busy, 0.5)
         every = max(1, len(everyone.points_robot) // numbers.near_points)
         points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
         few = replace(everyone, points_robot=points, weights=weights)
         turn = min(math.pi, max(numbers.near_rad, numbers.near_rad_s * prediction.elapsed))
-        loose = inverted(np.diag([numbers.near_m**2, numbers.near_m**2, turn**2]))
+        loose = inverted(spread(numbers.near_m, turn))
         window = SearchWindow(reach_m=numbers.near_m, turn_rad=turn)
         start = prediction.T_map_robot
         found = self._matcher.search(doubt.cell_map, few, start, loose, window)
         prices, climbed = budget.prices, len(points) + len(everyone.points_robot)
         scored = found.evaluations * len(points)
         budget.spend(prices.bound_ns * scored + prices.climb_ns * climbed)
-        found = self._matcher.climb(doubt.cell_map, everyone, found.T_map_robot, start, loose)
-        if is_same(found, doubt.match):
-            return []
-        return [doubt.places.begun(found, doubt.match)]
+        return self._matcher.climb(doubt.cell_map, everyone, found.T_map_robot, start, loose)
 
-    def _is_better(self, doubt: Doubt, place: Place, everyone: Observations) -> bool:
-        """Whether a place may be taken: one nearby at once, one far away after scans that are new.
-
-        It must explain clearly more of what is long known than where motion led.
+    def _is_slip(self, doubt: Doubt, found: Match, everyone: Observations) -> bool:
+        """Whether the robot slipped to a place nearby: the same map explains far more of the scan
+        there than where motion led.
         """
         config = self._matcher.config.belief
-        if place.waited > 0 or place.latest <= 0.0:
+        nats = doubt.places.told(found) - doubt.places.told(doubt.match) + math.log(config.slips)
+        if probabilities([0.0, self._unknown, nats])[2] < 1.0 - config.frozen_above:
             return False
-        if not place.near:
-            asked = place.scans >= config.again and novelty(place.way) >= ENOUGH
-            if not asked or self._unknown <= 0.0:
-                return False
+        poses = found.T_map_robot, doubt.match.T_map_robot
+        return self._gain_m(doubt.cell_map, everyone, *poses) >= config.more_m
+
+    def _is_certain(self, doubt: Doubt, place: Place, everyone: Observations) -> bool:
+        """Whether a likely place far away may be taken: after scans that are new, and if it explains
+        clearly more of what is long known than where motion led.
+        """
+        config = self._matcher.config.belief
+        asked = place.scans >= config.again and novelty(place.way) >= ENOUGH
+        if not asked or place.waited > 0 or place.latest <= 0.0 or self._unknown <= 0.0:
+            return False
         poses = place.match.T_map_robot, doubt.match.T_map_robot
         return self._gain_m(doubt.cell_map, everyone, *poses) >= config.more_m
 
-    def _taken(self, doubt: Doubt, place: Place, prediction: Prediction) -> Judged:
-        """The robot is there."""
-        config = self._matcher.config
-        self._doubt, self.p_lost, self._unknown = None, 0.0, -MOST_NATS
-        self._agreement.forget()
-        match, state = place.match, State.RELOCATED
-        if place.near:
-            match, state = replace(match, slipped=True), State.TRACKING
-            numbers = config.tracking.relocalise
-            wide = np.diag([numbers.near_m**2, numbers.near_m**2, numbers.near_rad**2])
-            prediction = replace(prediction, covariance=wide)
+    def _slipped(self, doubt: Doubt, found: Match, prediction: Prediction) -> Judged:
+        """The robot is there, and its map goes on from there."""
+        numbers = self._matcher.config.tracking.relocalise
+        wide = replace(prediction, covariance=spread(numbers.near_m, numbers.near_rad))
+        self._found()
         return Judged(
-            match=match, prediction=prediction, state=state, writes=place.near,
+            match=replace(found, slipped=True), prediction=wide, state=State.TRACKING, writes=True,
             cell_map=doubt.cell_map,
         )  # fmt: skip
+
+    def _relocated(self, doubt: Doubt, place: Place, prediction: Prediction) -> Judged:
+        """The robot is at a place far away."""
+        self._found()
+        return Judged(
+            match=place.match, prediction=prediction, state=State.RELOCATED,
+            cell_map=doubt.cell_map,
+        )  # fmt: skip
+
+    def _found(self) -> None:
+        self._doubt, self.p_lost, self._unknown = None, 0.0, -MOST_NATS
+        self._agreement.forget()
 
     def spread_about(self, T_map_robot: Float, anywhere: Callable[[Float], Float]) -> Float:
         """(3, 3) that the other places add to the covariance of a pose."""

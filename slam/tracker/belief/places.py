@@ -49,11 +49,9 @@ class Place:
     """One where the robot may be.
 
     match    of the latest scan that was matched there, carried on by odometry
-    nats     of all scans that were, for this place against none that is known; for one nearby,
-             against where motion led
+    nats     of all scans that were, for this place against none that is known
     latest   nats of the latest of them
     scans    that were matched there; ``way`` (3,) m, rad and s moved since the first of them
-    near     whether the robot may have slipped there, and need not have been carried
     asked    (3,) m, rad and s moved since the latest
     waited   scans since then, ``drift`` (3, 3) what odometry may be off since
     """
@@ -63,7 +61,6 @@ class Place:
     latest: float = 0.0
     scans: int = 1
     way: Float = field(default_factory=lambda: np.zeros(3))
-    near: bool = False
     asked: Float = field(default_factory=lambda: np.zeros(3))
     waited: int = 0
     drift: Float = field(default_factory=lambda: np.zeros((3, 3)))
@@ -94,10 +91,8 @@ class Places:
         self._found: list[Float] = []  # by the search, to be tried
         self._motion, self._drift = np.zeros(3), np.zeros((3, 3))  # since the scan searched for
 
-    def follow(
-        self, observations: Observations, prediction: Prediction, budget: Budget, here: Match
-    ) -> None:
-        """Follow all to the next scan; ``here``: its match where motion led."""
+    def follow(self, observations: Observations, prediction: Prediction, budget: Budget) -> None:
+        """Follow all to the next scan."""
         self._go_on(prediction)
         left = (1.0 - self._prices.known_share) * budget.left_ns
         moved: dict[int, Place] = {}
@@ -106,7 +101,7 @@ class Places:
             if moved and budget.left_ns <= left:
                 moved[id(place)] = waiting
             else:
-                moved[id(place)] = self._matched(waiting, observations, budget, here)
+                moved[id(place)] = self._matched(waiting, observations, budget)
         self.followed = [moved[id(place)] for place in self.followed]
 
     def explore(self, observations: Observations, budget: Budget) -> list[Place]:
@@ -136,14 +131,6 @@ class Places:
                 kept.append(place)
         least = kept[0].nats - self._matcher.config.belief.hopeless if kept else 0.0
         self.followed = [one for one in kept if one.nats >= least][: self._config.most]
-
-    def begun(self, match: Match, here: Match | None = None) -> Place:
-        """A place with what this scan says of it; ``here``: nearby, against where motion led."""
-        config, nats = self._matcher.config.belief, self.told(match)
-        if here is None:
-            return Place(match=match, nats=nats - config.best, latest=nats)
-        nats -= self.told(here)
-        return Place(match=match, nats=nats + math.log(config.slips), latest=nats, near=True)
 
     def told(self, match: Match) -> float:
         """Nats of a scan matched to the map, against a place that the map does not know."""
@@ -185,16 +172,16 @@ class Places:
             match = self._climb(observations, here, covariance, budget)
             few = min(len(observations.points_robot), self._matcher.numbers.climb.few)
             budget.spend(self._prices.approach_ns * few)
-            new.append(self.begun(match))
+            nats = self.told(match)
+            best = self._matcher.config.belief.best
+            new.append(Place(match=match, nats=nats - best, latest=nats))
             self.searches += self._search is None and not self._found
         return new
 
-    def _matched(
-        self, moved: Place, observations: Observations, budget: Budget, here: Match
-    ) -> Place:
+    def _matched(self, moved: Place, observations: Observations, budget: Budget) -> Place:
         """A scan says the less the less the robot has moved since the one before."""
         match = self._climb(observations, moved.match.T_map_robot, moved.drift, budget)
-        latest = self.told(match) - (self.told(here) if moved.near else 0.0)
+        latest = self.told(match)
         return replace(
             moved, match=match, nats=moved.nats + novelty(moved.asked) * latest, latest=latest,
             scans=moved.scans + 1, asked=np.zeros(3), waited=0, drift=np.zeros((3, 3)),
