@@ -187,7 +187,8 @@ class Assembly:
     def into(self, spec: mujoco.MjSpec) -> None:
         """Hand everything over to ``spec``, whose materials the parts use from now on.
 
-        Raises ``InvalidValueError`` for a material that ``spec`` does not have.
+        Raises ``InvalidValueError`` for a material that ``spec`` does not have, and for two cameras
+        of one name.
         """
         for kin, group in self._groups.items():
             geoms = group.geoms  # still the same geoms once attached
@@ -197,7 +198,13 @@ class Assembly:
             check_materials(spec, geoms, f"part '{kin}'")
         self._groups = {}
         for camera in spec.cameras:
-            camera.name = camera.name.rpartition("/")[2]
+            name = camera.name.rpartition("/")[2]
+            try:
+                camera.name = name
+            except ValueError:
+                raise InvalidValueError(
+                    f"camera '{name}': there are two of that name; 'follow' is the robot's"
+                ) from None
 
 
 def _stand(child: mujoco.MjSpec, pose: Pose) -> None:

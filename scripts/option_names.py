@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """How a command line is read: lists, names that a shell completes, errors that name options."""
 
+import os
 import re
 from collections.abc import Mapping, Sequence
 from importlib import import_module
@@ -104,7 +105,7 @@ class Verb(TyperCommand):
             if isinstance(word, (str, Path)) and str(word)
         ]
         for name, path in words:
-            if name not in WRITTEN and not (name in COMPLETED and path.is_dir()):
+            if name not in WRITTEN and not (name in COMPLETED and os.path.isdir(path)):
                 inputs.note(path)
         inputs.refuse(*(path for name, path in words if name in WRITTEN))
 

@@ -118,7 +118,13 @@ def _keep(path: Path, temporary: Path, listed: Set[str]) -> list[str]:
         return []
     kept = []
     for name in sorted(set().union(*tree(path, results=False)) - listed):
-        place = temporary / name
+        *above, last = Path(name).parts
+        folder = temporary
+        for part in above:  # a folder of theirs may bear the name of a file of ours, too
+            folder = folder / part
+            while os.path.lexists(folder) and (folder.is_symlink() or not folder.is_dir()):
+                folder = folder.with_name(folder.name + OLD)
+        place = folder / last
         while os.path.lexists(place):
             place = place.with_name(place.name + OLD)
         files.make_folder(place.parent)

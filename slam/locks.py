@@ -69,13 +69,17 @@ def _alone(folder: Path) -> Iterator[None]:
 
 
 def _opened(path: Path, mode: str = "a") -> IO[str]:
-    """Itself, not what it links to."""
-    return open(
+    """Itself, not what it links to; ``OutputError`` for a second name of somebody's file."""
+    file = open(  # noqa: SIM115 (whoever asked closes it)
         path,
         mode,
         encoding="ascii",
         opener=lambda name, how: os.open(name, how | UNFOLLOWED, 0o666),
     )
+    if os.fstat(file.fileno()).st_nlink > 1:
+        file.close()
+        raise OutputError(f"{path} is another name of a file elsewhere: move it away")
+    return file
 
 
 def _same(held: IO[str], path: Path) -> bool:

@@ -212,6 +212,30 @@ def test_what_was_killed_with_a_link_beside_is_not_put_into_its_place(
     assert state(outside) == before
 
 
+@pytest.mark.parametrize("name", ["grown", "published", "recorded"])
+def test_a_second_name_of_a_file_elsewhere_is_not_written(name: str, tmp_path: Path, outside: Path):
+    """What ``ln`` makes is a file like any other; of it, only a lock would be written in place."""
+    writer, _ = WRITERS[name]
+    base, before = tmp_path / "base", state(outside)
+    grown(base) if name == "published" else base.mkdir()
+    writer(base)
+    for planted in (*locks.NAMES, *(one.format(pid=os.getpid()) for one in HIDDEN), "SHA256SUMS"):
+        out = tmp_path / "out"
+        shutil.copytree(base, out)
+        (out / planted).unlink(missing_ok=True)
+        os.link(outside / "notes.txt", out / planted)
+        told = ""
+        try:
+            writer(out)
+        except MobiliaError as error:
+            told = str(error)
+        assert (f"{planted} is another name of a file elsewhere" in told) == (
+            planted in locks.NAMES
+        )
+        shutil.rmtree(out)
+    assert state(outside) == before
+
+
 def test_a_link_that_is_typed_is_followed(tmp_path: Path):
     (tmp_path / "real").mkdir()
     (tmp_path / "out").symlink_to("real")

@@ -181,6 +181,15 @@ def test_what_mujoco_refuses_of_the_whole_is_one_line(plan):
         scenes.build(name).compile()
 
 
+@pytest.mark.parametrize(
+    ("cameras", "name"),
+    [('<camera name="follow"/>', "follow"), ('<camera name="a/top"/><camera name="top"/>', "top")],
+)
+def test_two_cameras_of_one_name_are_one_line(plan, cameras, name):
+    with pytest.raises(InvalidValueError, match=rf"shed\.xml: camera '{name}': there are two"):
+        scenes.build(plan(SHED.replace("<worldbody>", f"<worldbody>{cameras}")), 1)
+
+
 @pytest.mark.parametrize("verb", [["run", "odometry", "--scene"], ["scene", "check"]])
 @pytest.mark.parametrize("case", ["world: far", "world: nan", "world: mark", "world: replicate"])
 def test_run_and_check_refuse_the_same_in_one_line(case, verb, plan, capsys, monkeypatch, tmp_path):

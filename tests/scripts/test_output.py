@@ -174,6 +174,20 @@ def test_a_file_of_theirs_under_a_name_of_ours_is_kept_under_another(tmp_path: P
     assert "write: data.txt.old, data.txt.old.old" in capsys.readouterr().out
 
 
+def test_a_folder_of_theirs_under_the_name_of_a_file_of_ours_is_kept_under_another(tmp_path: Path):
+    run = tmp_path / "run"
+    make(run, "one")
+    (run / "data.txt").unlink()
+    for name in ("data.txt/a/b", "data.txt/c", "data.txt.old"):
+        write_text(run / name, f"my {name}")
+    make(run, "two", overwrite=True)
+    assert contents(run) == {
+        "data.txt": "two", "data.txt.old": "my data.txt.old", "data.txt.old.old/a/b":
+        "my data.txt/a/b", "data.txt.old.old/c": "my data.txt/c",
+        "recipe.json": (run / "recipe.json").read_text(),
+    }  # fmt: skip
+
+
 @pytest.mark.parametrize("list_", [None, "", "0" * 64 + "  ../x\n", "no list"])
 def test_a_result_without_its_list_is_not_replaced(tmp_path: Path, list_: str | None):
     make(tmp_path / "run", "one")

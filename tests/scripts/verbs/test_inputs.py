@@ -197,3 +197,10 @@ def test_every_path_of_a_verb_is_read_or_written():
     }
     assert paths == {*read, *WRITTEN}
     assert all(issubclass(one.cls, Verb) for one in app.registered_commands)
+
+
+@pytest.mark.parametrize("word", ["pipe:" + "x" * 5000, "x/" * 5000])
+def test_a_command_longer_than_the_name_of_a_file_is_no_folder(word: str):
+    command = Verb(name="run", params=[])
+    with inputs.of_one_command():
+        command._note_inputs({"slam": word, "scene": "arena", "out": Path("x" * 5000)})
