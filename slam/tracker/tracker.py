@@ -214,14 +214,14 @@ class Tracker(abc.ABC):
         """Returns how far the matched returns are trusted, in [0, 1]."""
         match, prediction = judged.match, judged.prediction
         agreement = self._standing.agreement
-        lasting = agreement.left_behind()
+        lasting, now = agreement.left_behind(), agreement.covariance()
         if match.slipped:  # found by a search, among what does not fit there
             lasting = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
         self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
         matched = match.tau > 0.0 and not match.slipped
         if evidence is not None and matched:
             self._pose_covariance.held(agreement.shown, evidence.old_off_m2, prediction.elapsed)
-        self._pose_covariance.dragged(lasting)
+        self._pose_covariance.dragged(lasting, now)
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
             self._odometry_noise.note_slip(prediction, match)
         else:
@@ -261,15 +261,13 @@ class Tracker(abc.ABC):
         sure, belief = self._pose_covariance, self._belief
         self._before, self._T_map_robot = frame.odometry, match.T_map_robot
         T_map_robot, state = match.T_map_robot, belief.state
-        p_lost = 1.0 - (1.0 - belief.p_lost) * (1.0 - sure.p_off)
-        doubtful = p_lost > self.config.belief.frozen_above
         self._path.add(frame.stamp_ns, T_map_robot)
         covariance = sure.covariance + belief.spread_about(T_map_robot, self._loops.anywhere)
         return Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=T_map_robot,
             covariance=covariance,
-            converged=state in (State.TRACKING, State.RELOCATED) and not doubtful,
+            converged=state in (State.TRACKING, State.RELOCATED),
             diagnostics={
                 "state": state.value,
                 "matched": match.matched,
@@ -279,7 +277,7 @@ class Tracker(abc.ABC):
                 "unobservable_rad": sure.along_rad,
                 "nis": self._odometry_noise.nis,
                 "trust": trust,
-                "p_lost": p_lost,
+                "p_lost": belief.p_lost,
                 "correction": self._path.moved_by.tolist(),
                 "T_map_odom": self._path.T_map_odom.tolist(),
             },

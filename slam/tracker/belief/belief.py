@@ -102,7 +102,7 @@ class Belief:
         local = cell_map if doubt is None else doubt.local
         match = near(self._match(observations, prediction, local), prediction)
         if prediction.elapsed <= OFTEN_S:
-            self._agreement.take(prediction, match.T_map_robot)
+            self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
             match = self._undragged(cell_map, observations, match)
         share = self._matcher.usual.share(match, observations)
         nats = self._goes_on(cell_map, observations, match, share)

@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Whether odometry denies what matches have made of it, over seconds, not only from scan to scan.
+"""Whether movers pull the matches along, over seconds, not only from scan to scan.
 
 Who is carried along by movers is corrected a little in each scan, always to the same side. No one
-correction is more than odometry may be off, but their sum is.
+correction is more than odometry may be off, but their sum is. Where old surface is in view that
+shows the direction of a correction, it is odometry's error. Where there is none, movers may have
+made it.
 """
 
 import math
@@ -16,6 +18,8 @@ from slam.tracker.standing.config import StandingConfig
 from slam.tracker.uncertainty.covariances import carried
 
 HELD_S = 0.5  # s over which the old surface that scans saw is averaged; set by hand
+FEW = 0.05  # share of the returns without weight with which the whole is left to movers; by hand
+LEVER_M = 0.5  # m: a heading is held by old surface so far away; set by hand
 
 
 class Agreement:
@@ -24,12 +28,13 @@ class Agreement:
     A match corrects the prediction by c. A window of w s forgets with exp(-t / w): F is the sum of
     c, V that of odometry's covariances. With R, what a match itself may be off and what odometry
     may be off systematically, a share of way and turn, F' (V + R)^-1 F / 3 is at most about 1 where
-    all is well.
+    all is well. G is the information of the old surface that the scans before saw, u the share of
+    the returns without weight. With H = diag(1, 1, lever^2), ``min(u / few, 1) H (H + G)^-1`` is
+    the share of c that movers may have made; S is their sum.
     """
 
     def __init__(self, config: StandingConfig) -> None:
         self._config = config
-        self._put_back: Float = np.zeros((3, 3))
         self.forget()
 
     def forget(self) -> None:
@@ -38,14 +43,17 @@ class Agreement:
         self._begin_window()
 
     def _begin_window(self) -> None:
-        self._sum, self._variance = np.zeros(3), np.zeros((3, 3))
+        self._sum, self._by_movers = np.zeros(3), np.zeros(3)
+        self._variance, self._elapsed_s = np.zeros((3, 3)), 0.0
         self._way_m = self._turn_rad = 0.0
 
     def turned(self, by: float) -> None:
         """The map frame was turned by ``by`` rad, and the robot with it."""
-        x, y, turn = self._sum.tolist()
         c, s = math.cos(by), math.sin(by)
-        self._sum = np.array([c * x - s * y, s * x + c * y, turn])
+        self._sum, self._by_movers = (
+            np.array([c * x - s * y, s * x + c * y, turn])
+            for x, y, turn in (self._sum.tolist(), self._by_movers.tolist())
+        )
         self._variance, self._held = turned(self._variance, by), turned(self._held, by)
 
     def hold(self, old: Float, elapsed_s: float) -> None:
@@ -70,11 +78,21 @@ class Agreement:
             known = across
         return covariance - inverted(inverted(covariance) + known)
 
-    def take(self, prediction: Prediction, T_map_robot: Float) -> None:
-        """The robot is matched to ``T_map_robot``."""
+    def _left_to_movers(self, off: Float, vote: float) -> Float:
+        """(3,) of a correction by returns of that mean vote."""
+        share = np.array([1.0, 1.0, LEVER_M**2])
+        x, y, turn = off.tolist()
+        inverse = inverted(np.diag(share) + self._held / max(self._looks, 1.0))
+        pulled = inverse[:, 0] * x + inverse[:, 1] * y + inverse[:, 2] * turn
+        return np.asarray(min(max(1.0 - vote, 0.0) / FEW, 1.0) * share * pulled)
+
+    def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
+        """The robot is matched to ``T_map_robot`` by returns of that mean vote."""
         keep = math.exp(-prediction.elapsed / self._config.window_s)
         x, y, turn = prediction.increment.tolist()
-        self._sum = keep * self._sum + prediction.off(T_map_robot)
+        off, self._elapsed_s = prediction.off(T_map_robot), prediction.elapsed
+        self._sum = keep * self._sum + off
+        self._by_movers = keep * self._by_movers + self._left_to_movers(off, vote)
         self._variance = keep * keep * self._variance + prediction.covariance
         self._way_m = keep * self._way_m + math.hypot(x, y)
         self._turn_rad = keep * self._turn_rad + abs(turn)
@@ -94,14 +112,18 @@ class Agreement:
         return pose
 
     def put_back(self) -> None:
-        """The pose was put back there: the window begins anew.
-
-        Half of the corrections may have been right: ``left_behind`` says so.
-        """
-        self._put_back = 0.25 * np.multiply.outer(self._sum, self._sum)
+        """The pose was put back there: the window begins anew."""
         self._begin_window()
 
+    def covariance(self) -> Float:
+        """(3, 3) of the pose by what movers may have made of its corrections: S S'."""
+        return np.multiply.outer(self._by_movers, self._by_movers)
+
     def left_behind(self) -> Float:
-        """(3, 3) of the pose by what was put back. It is handed over once."""
-        left, self._put_back = self._put_back, np.zeros((3, 3))
-        return left
+        """(3, 3) the part of that which the window is about to forget: the map's from now on.
+
+        It is handed over once, until the next match.
+        """
+        keep = math.exp(-self._elapsed_s / self._config.window_s)
+        self._elapsed_s = 0.0
+        return (1.0 - keep * keep) * self.covariance()

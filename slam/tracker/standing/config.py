@@ -54,16 +54,12 @@ class StandingConfig(Settings):
         low=1e-3,
     )
     disagreed: float = number(
-        5.0, "ratio", "of corrections over what odometry may be off, squared: above, a match must "
+        3.0, "ratio", "of corrections over what odometry may be off, squared: above, a match must "
         "explain clearly more of the map than where odometry leads; 0: never asked", SEEDS,
     )  # fmt: skip
     scale: float = number(0.1, "share", "of way and turn that odometry may be off by in a window")
     match_m: float = number(0.005, "m", "what a match itself may be off", SEEDS, low=1e-6)
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
-    alert_m: float = number(
-        0.5, "m", "a position off by more is wrong: the probability that movers carried it so far "
-        "is part of p_lost; 0: never asked", "the alert limit of docs/integrity.md",
-    )  # fmt: skip
 
 
 ALL_VOTE = StandingConfig(settled_s=0.0)  # every return

@@ -37,9 +37,6 @@ class PoseCovariance:
     covariance    (3, 3) of (x, y, theta) in the map frame; zero at the known start
     shared_m2     m^2, variance of the residual that neighbouring points of a surface share
     newest_drift  (3, 3) what the latest frame added to the error of the map
-    by_movers_m   deviation of the position by what movers may have carried map and robot off
-    p_off         probability that they carried them by more than ``standing.alert_m``: in one
-                  direction, as in a corridor, or alike in all, whichever is more
     unobservable  directions of position (0, 1 or 2) about which the latest scans say no more than
                   the noise of their beams would
     unseen_s      s since all directions were observable, lost ones too; it fades once they are
@@ -67,15 +64,12 @@ class PoseCovariance:
         self._drift: Float = np.zeros((3, 3))
         self._blind: Float = np.zeros((3, 3))
         self._shared: Float = np.zeros((3, 3))
-        self._by_movers: Float = np.zeros((3, 3))
-        self._alert_m, self._window_s = config.standing.alert_m, config.standing.window_s
-        self.by_movers_m = self.p_off = 0.0
+        self._window_s = config.standing.window_s
         self.loaded: Float | None = None
 
     def relocated(self, covariance: Float) -> None:
         """Found again somewhere in the map, to within ``covariance`` (3, 3)."""
         self._blind = covariance.copy()
-        self._by_movers = np.zeros((3, 3))
         self.unseen_s = 0.0
 
     def resumed(self, covariance: Float, loaded: Float) -> None:
@@ -88,8 +82,6 @@ class PoseCovariance:
         """A loop says that the map in view is off by ``covariance`` (3, 3), and no more."""
         self._drift = covariance.copy()
         self.covariance = self._drift + self._blind + self._shared
-        if _far(covariance) < _far(self._by_movers):
-            self._by_movers = covariance.copy()
 
     def odometry_part(self, motion: Float) -> Float:
         """Covariance (3, 3), after ``motion`` in the map, of odometry's own part of late.
@@ -149,17 +141,14 @@ class PoseCovariance:
         faded = math.exp(-elapsed / config.view_s)
         self.unseen_s = self.unseen_s + elapsed if self.unobservable else self.unseen_s * faded
 
-    def dragged(self, covariance: Float) -> None:
-        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot."""
+    def dragged(self, covariance: Float, now: Float) -> None:
+        """The map is off by ``covariance`` (3, 3) more: movers may have carried the robot.
+
+        ``now``: (3, 3) that the pose alone is off by more, until the next frame.
+        """
         self._drift = self._drift + covariance
         self.newest_drift = self.newest_drift + covariance
-        self.covariance = self.covariance + covariance
-        self._by_movers = self._by_movers + covariance
-        self.by_movers_m = _far(self._by_movers)
-        least = min(self._alert_m, self.by_movers_m)
-        deviations = self._alert_m / self.by_movers_m if least > 0.0 else math.inf
-        along = math.erfc(math.sqrt(0.5) * deviations)
-        self.p_off = max(along, math.exp(-(deviations**2)))
+        self.covariance = self.covariance + covariance + now
 
     @property
     def off_m(self) -> float:
@@ -177,10 +166,8 @@ class PoseCovariance:
         share *= 1.0 - math.exp(-elapsed / self._window_s)
         if share <= 0.0 or self.unobservable == 2:
             return
-        self._drift, self._by_movers = (
-            covariance + share * (SINGULAR - shown(covariance + SINGULAR, self.along_rad))
-            for covariance in (self._drift, self._by_movers)
-        )
+        shown_of = shown(self._drift + SINGULAR, self.along_rad)
+        self._drift = self._drift + share * (SINGULAR - shown_of)
         self.covariance = self._drift + self._blind + self._shared
 
     def turned(self, by: float) -> None:
@@ -190,7 +177,6 @@ class PoseCovariance:
         xx, xy, yy = self._new_geometry
         part = turned(np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, 0.0]]), by)
         self._new_geometry = [float(part[0, 0]), float(part[0, 1]), float(part[1, 1])]
-        self._by_movers = turned(self._by_movers, by)
         self.along_rad = None if self.along_rad is None else self.along_rad + by
         self.covariance = self._drift + self._blind + self._shared
 
