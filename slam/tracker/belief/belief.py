@@ -29,6 +29,7 @@ from slam.tracker.rasterise import seen_at
 from slam.tracker.standing.agreement import Agreement
 
 OFTEN_S = 1.0  # scans that come more seldom say nothing of what moves; set by hand
+STILL = np.diag([1e8, 1e8, 1e8])  # 1/m^2, 1/rad^2: a pose that does not move
 ENOUGH = 0.5  # of the novelty of a place far away, before it is taken; set by hand
 
 
@@ -105,17 +106,18 @@ class Belief:
             self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
             match = self._undragged(cell_map, observations, match)
         share = self._matcher.usual.share(match, observations)
-        nats = self._goes_on(cell_map, observations, match, share)
+        odd = per_h > 0.0 and share < config.tracking.relocalise.goes_on
+        if doubt is None and odd:
+            doubt = Doubt(cell_map, self._matcher)
+        nats = self._goes_on(doubt, observations, match, share)
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_NATS)
         if nats >= 0.0:
             self._matcher.usual.follow(match, observations, prediction.elapsed)
         else:  # by odometry: what it was matched to says nothing
             by_odometry = unmatched(prediction.T_map_robot, matched=match.matched, score=0.0)
             match = replace(by_odometry, overlapped=match.overlapped)
-        odd = per_h > 0.0 and share < config.tracking.relocalise.goes_on
         self._weigh([] if doubt is None else doubt.places.followed)
-        frozen = nats < 0.0 or self.p_lost > config.belief.frozen_above
-        if doubt is None and not (odd or frozen):
+        if doubt is None and self.p_lost <= config.belief.frozen_above:
             return self._settled(cell_map, match, prediction)
         doubt = self._doubt = doubt or Doubt(cell_map, self._matcher)
         doubt.match = match
@@ -128,24 +130,18 @@ class Belief:
         config, agreement = self._matcher.config, self._agreement
         if not 0.0 < config.standing.disagreed < agreement.denied:
             return match
+        back = unmatched(agreement.led(match.T_map_robot), matched=match.matched, score=0.0)
         old = cell_map if self._doubt is None else self._doubt.cell_map
-        back = agreement.led(match.T_map_robot)
-        if self._gain_m(old, observations, match.T_map_robot, back) >= config.belief.more_m:
+        if gain_m(old, observations, match, back) >= config.belief.more_m:
             return match
         agreement.put_back()
-        return replace(unmatched(back, matched=match.matched, score=0.0), overlapped=match.overlapped)
-
-    @staticmethod
-    def _gain_m(cell_map: CellMap, observations: Observations, one: Float, other: Float) -> float:
-        """m of long-known surface that one pose explains more than another: confirmed less seen
-        through."""
-        there, here = (seen_at(cell_map, observations, pose) for pose in (one, other))
-        return (there.known - there.through) - (here.known - here.through)
+        return replace(back, overlapped=match.overlapped)
 
     def _goes_on(
-        self, cell_map: CellMap, observations: Observations, match: Match, share: float
+        self, doubt: Doubt | None, observations: Observations, match: Match, share: float
     ) -> float:
-        """Nats of a scan for where motion led, by what goes on from the scans before.
+        """Nats of a scan for where motion led, by what goes on from the scans before; in doubt, by
+        what the map explains, if that is less.
 
         Against it no more than by what it sees through: what is hidden denies nothing.
         """
@@ -153,13 +149,23 @@ class Belief:
         if observations.weight < config.tracking.relocalise.least_weight:
             return 0.0
         nats = told(config.belief, share)
-        if nats >= 0.0 or config.carried_per_h == 0.0:
+        if doubt is None:
             return max(nats, 0.0)
-        doubt = self._doubt
-        old = cell_map if doubt is None else doubt.cell_map
-        through_m = seen_at(old, observations, match.T_map_robot).through
+        doubt.told = doubt.places.told(self._on_map(doubt, observations, match))
+        nats = min(nats, doubt.told)
+        if nats >= 0.0:
+            return nats
+        through_m = seen_at(doubt.cell_map, observations, match.T_map_robot).through
         most = config.belief.hidden * max(through_m - config.belief.hidden_m, 0.0)
         return max(nats, -most)
+
+    def _on_map(self, doubt: Doubt, observations: Observations, match: Match) -> Match:
+        """A match to the copy, on the map of before the doubt."""
+        if doubt.local is doubt.cell_map:
+            return match
+        there = match.T_map_robot
+        everyone = observations.with_votes(None)
+        return self._matcher.climb(doubt.cell_map, everyone, there, there, STILL)
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
         """A scan without a return says nothing: odometry alone."""
@@ -240,26 +246,22 @@ class Belief:
         return self._matcher.climb(doubt.cell_map, everyone, found.T_map_robot, start, loose)
 
     def _is_slip(self, doubt: Doubt, found: Match, everyone: Observations) -> bool:
-        """Whether the robot slipped to a place nearby: the same map explains far more of the scan
-        there than where motion led.
+        """Whether the robot slipped to a place nearby, which is certain against one that the map
+        does not know, too.
         """
-        config = self._matcher.config.belief
-        nats = doubt.places.told(found) - doubt.places.told(doubt.match) + math.log(config.slips)
-        if probabilities([0.0, self._unknown, nats])[2] < 1.0 - config.frozen_above:
-            return False
-        poses = found.T_map_robot, doubt.match.T_map_robot
-        return self._gain_m(doubt.cell_map, everyone, *poses) >= config.more_m
+        config, nats = self._matcher.config.belief, doubt.places.told(found)
+        p = probabilities([0.0, self._unknown, nats - doubt.told + math.log(config.slips)])[2]
+        sure = min(p, probabilities([0.0, nats])[1]) >= 1.0 - config.frozen_above
+        return sure and gain_m(doubt.cell_map, everyone, found, doubt.match) >= config.more_m
 
     def _is_certain(self, doubt: Doubt, place: Place, everyone: Observations) -> bool:
-        """Whether a likely place far away may be taken: after scans that are new, and if it explains
-        clearly more of what is long known than where motion led.
-        """
+        """Whether a likely place far away may be taken: after scans that are new."""
         config = self._matcher.config.belief
         asked = place.scans >= config.again and novelty(place.way) >= ENOUGH
-        if not asked or place.waited > 0 or place.latest <= 0.0 or self._unknown <= 0.0:
-            return False
-        poses = place.match.T_map_robot, doubt.match.T_map_robot
-        return self._gain_m(doubt.cell_map, everyone, *poses) >= config.more_m
+        better = probabilities([0.0, place.latest - doubt.told])[1] >= 1.0 - config.frozen_above
+        better = better and place.latest > 0.0 and self._unknown > 0.0
+        more_m = gain_m(doubt.cell_map, everyone, place.match, doubt.match) if asked and better else 0.0
+        return place.waited == 0 and more_m >= config.far_m
 
     def _slipped(self, doubt: Doubt, found: Match, prediction: Prediction) -> Judged:
         """The robot is there, and its map goes on from there."""
@@ -295,3 +297,10 @@ class Belief:
             total += p * np.multiply.outer(off, off)
         # the places that are followed need not be all: who is lost may be anywhere
         return total + self.p_lost * anywhere(T_map_robot)
+
+
+def gain_m(cell_map: CellMap, observations: Observations, one: Match, other: Match) -> float:
+    """m of long-known surface that a scan explains more at one pose than at another: confirmed less
+    seen through."""
+    there, here = (seen_at(cell_map, observations, at.T_map_robot) for at in (one, other))
+    return (there.known - there.through) - (here.known - here.through)

@@ -36,6 +36,7 @@ class BeliefConfig(Settings):
         1.2, "m", "of long-known surface that a place taken explains more than where motion led",
         RIGHT,
     )  # fmt: skip
+    far_m: float = number(3.0, "m", "the same of one far away", RIGHT)
     again: int = number(
         4, "scans", "that are asked of a place far away before it is taken", low=1, high=1000
     )
