@@ -119,8 +119,9 @@ class Belief:
         self._weigh([] if doubt is None else doubt.places.followed)
         if doubt is None and self.p_lost <= config.belief.frozen_above:
             return self._settled(cell_map, match, prediction)
+        everyone = observations.with_votes(None)
         doubt = self._doubt = doubt or Doubt(cell_map, self._matcher)
-        doubt.match = match
+        doubt.match, doubt.told = match, doubt.places.told(self._on_map(doubt, everyone, match))
         return self._searched(doubt, observations, prediction, nats)
 
     def _undragged(self, cell_map: CellMap, observations: Observations, match: Match) -> Match:
@@ -140,8 +141,7 @@ class Belief:
     def _goes_on(
         self, doubt: Doubt | None, observations: Observations, match: Match, share: float
     ) -> float:
-        """Nats of a scan for where motion led, by what goes on from the scans before; in doubt, by
-        what the map explains, if that is less.
+        """Nats of a scan for where motion led, by what goes on from the scans before.
 
         Against it no more than by what it sees through: what is hidden denies nothing.
         """
@@ -149,22 +149,17 @@ class Belief:
         if observations.weight < config.tracking.relocalise.least_weight:
             return 0.0
         nats = told(config.belief, share)
-        if doubt is None:
+        if nats >= 0.0 or doubt is None:
             return max(nats, 0.0)
-        doubt.told = doubt.places.told(self._on_map(doubt, observations, match))
-        nats = min(nats, doubt.told)
-        if nats >= 0.0:
-            return nats
         through_m = seen_at(doubt.cell_map, observations, match.T_map_robot).through
         most = config.belief.hidden * max(through_m - config.belief.hidden_m, 0.0)
         return max(nats, -most)
 
-    def _on_map(self, doubt: Doubt, observations: Observations, match: Match) -> Match:
-        """A match to the copy, on the map of before the doubt."""
+    def _on_map(self, doubt: Doubt, everyone: Observations, match: Match) -> Match:
+        """What a match to the copy is on the map of before the doubt."""
         if doubt.local is doubt.cell_map:
             return match
         there = match.T_map_robot
-        everyone = observations.with_votes(None)
         return self._matcher.climb(doubt.cell_map, everyone, there, there, STILL)
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
