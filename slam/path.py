@@ -15,9 +15,6 @@ from slam.trajectory import Trajectory
 class PosePath:
     """Stamps (ns) and poses ``T_map_robot`` (m, m, rad) of the frames so far.
 
-    A lost robot is reported at its likeliest place, which need not be where its motion led. Loops
-    correct the motion, and decide where it was.
-
     T_map_odom  (3,) all corrections of the map so far
     moved_by    (3,) by how much the latest pose was moved since the frame before
     """
@@ -25,7 +22,6 @@ class PosePath:
     def __init__(self) -> None:
         self._stamps = array("q")
         self._poses = array("d")  # three numbers each
-        self._reported: dict[int, Float] = {}  # by frame, where it is not the motion's
         self.T_map_odom, self.moved_by = np.zeros(3), np.zeros(3)
 
     def __len__(self) -> int:
@@ -38,17 +34,14 @@ class PosePath:
                 f"frames must come in order: {stamp_ns} ns after {self._stamps[-1]} ns"
             )
 
-    def add(self, stamp_ns: int, T_map_robot: Float, reported: Float | None = None) -> None:
-        """The pose of one more frame, as its motion led there; ``reported``: if at another."""
-        if reported is not None:
-            self._reported[len(self._stamps)] = reported.copy()
+    def add(self, stamp_ns: int, T_map_robot: Float) -> None:
+        """The pose of one more frame."""
         self._stamps.append(stamp_ns)
         self._poses.extend(T_map_robot.tolist())
 
     def correct(self, poses: Float, T_new_old: Float, T_map_robot: Float) -> Float:
         """The map moved: the frames so far were at these (n, 3); the latest pose in it."""
         self._poses = array("d", poses.ravel())
-        self._reported.clear()
         self.T_map_odom = se2.compose(T_new_old, self.T_map_odom)
         moved = se2.compose(T_new_old, T_map_robot)
         self.moved_by = moved - T_map_robot
@@ -58,13 +51,6 @@ class PosePath:
     def poses(self) -> Float:
         """(n, 3) m, m, rad, as motion led."""
         return np.array(self._poses).reshape(-1, 3)
-
-    def reported(self) -> Float:
-        """(n, 3) m, m, rad, as reported, or as corrected since."""
-        poses = self.poses()
-        for k, T_map_robot in self._reported.items():
-            poses[k] = T_map_robot
-        return poses
 
     def trajectory(self, poses: Float | None = None) -> Trajectory:
         """The poses as they were reported, or others (n, 3) for the same stamps."""

@@ -33,7 +33,7 @@ from slam.tracker.standing.config import ALL_VOTE, StandingConfig
 from slam.tracker.tracker import Tracker
 
 OCTOMAP = "Hornung et al. 2013"
-SURE = 0.65  # share: w of a cell that counts whole when it is seen through; by hand
+SURE = 0.65  # share: w of a cell from which on it is long known; by hand
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -111,7 +111,7 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     looked at.
     """
     confirmed, contradicted, visited = 0.0, 0.0, 0
-    known, through, sure = 0.0, 0.0, 0.0
+    known, through = 0.0, 0.0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
@@ -141,7 +141,6 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
                             continue
                         contradicted += y
                         through += weight
-                        sure += weight**3
                         more = odds.miss
                     else:
                         confirmed += y * given
@@ -159,8 +158,7 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
                         log_odds[slot, jj, ii] = now
                         cells.age[slot, jj, ii] += step
                         cells.y[slot, jj, ii] = max(math.tanh(0.5 * now), 0.0)
-    sure *= cell / SURE**3
-    return Look(confirmed, contradicted, visited, known * cell, through * cell, sure)
+    return Look(confirmed, contradicted, visited, known * cell, through * cell)
 
 
 @njit

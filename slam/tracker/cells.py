@@ -72,8 +72,6 @@ class Look(NamedTuple):
     known         m of long-known surface that it confirms: a trace y that was looked at for ``age``
                   s counts w = y age / (age + known_s)
     through       the same that it sees through, by w c, c as of ``crossed``
-    sure          the same by (w c / ``SURE`` of the map)^3: what was there in few of the looks was no
-                  wall, and need not be there now
     """
 
     confirmed: float
@@ -81,7 +79,6 @@ class Look(NamedTuple):
     visited: int
     known: float
     through: float
-    sure: float
 
 
 LEAST_M = 1e-6  # m; a shorter beam has no direction: numerical guard

@@ -55,8 +55,6 @@ class TrackerConfig(Settings):
         "freeze_below": "carried_per_h",
         "tracking.freeze_below": "carried_per_h",
         "tracking.quality.give_up_s": "tracking.give_up_s",
-        "standing.doubtful_m": "standing.alert_m",
-        "standing.long_window_s": "standing.window_s",
     }
     constants: ClassVar[Mapping[str, str]] = {
         "frontend": "slam.frontend.observations",

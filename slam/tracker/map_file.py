@@ -41,15 +41,21 @@ _GROUPS = {
 }
 _NUMBERS: dict[str, tuple[str, ...]] = {
     "frontend": ("spacing_m", "least_weight"),
-    "belief": ("changed_per_m", "confirmed_share", "through_per_m"),
+    "belief": (
+        "alike", "broken", "breaks", "changed_per_m", "confirmed", "confirmed_m",
+        "confirmed_share", "corrected", "goes_on", "linear_m", "nearby_per_m", "outdated", "place",
+        "pulled_m", "pulled_rad", "searched", "slip_m", "slip_rad", "slips_per_m", "through",
+        "through_per_m", "unsearched", "vanished",
+    ),
+    "matching.usual": ("fallen", "odd", "outvoted"),
     "standing": (
-        "better", "doubtful_m", "explains", "fallen", "fallen_s", "long_window_s", "outvoted",
+        "alert_m", "better", "doubtful_m", "explains", "fallen", "fallen_s", "long_window_s", "outvoted",
         "rival_gain", "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans",
-        "undecided_s",
+        "undecided_s", "young_trace",
     ),
     "tracking.relocalise": (
         "alias", "alone", "denied_here", "drift_m", "drift_rad", "enough", "enough_last",
-        "enough_later", "farthest_m", "farthest_rad", "few_vote", "hopeless", "last", "later",
+        "enough_later", "farthest_m", "farthest_rad", "few_vote", "hopeless", "kept", "last", "later",
         "on_m", "on_rad", "on_s", "pushed_mps", "pushed_radps", "scans", "slipped_m",
         "slipped_rad", "sure",
     ),

@@ -31,9 +31,7 @@ from slam.tracker.cells import (
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
 
-# share: w c (``cells.Look``) at which a cell that is seen through counts whole, a surer one more;
-# it sets the unit of D; by hand
-SURE = 0.35
+SURE = 0.35  # share: w (``cells.Look``) from which on a cell is long known; by hand
 
 
 class Law(NamedTuple):
@@ -103,7 +101,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
     view = View(v[0], v[1], v[2], v[3], v[4], v[5])
     law = Law(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11])
     confirmed, contradicted, visited = 0.0, 0.0, 0
-    known, through, sure = 0.0, 0.0, 0.0
+    known, through = 0.0, 0.0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
     size = SIDE * cell
@@ -145,7 +143,6 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                         )
                         weight *= crossed(cells.facing[slot, jj, ii], px, py)
                         through += weight
-                        sure += weight**3
                     elif not behind:
                         confirmed += y * given
                         weight = (
@@ -185,8 +182,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
                 cells.counts[FREE_COUNT] += 1
     if write:
         released(cells)
-    sure *= cell / SURE**3
-    return Look(confirmed, contradicted, visited, known * cell, through * cell, sure)
+    return Look(confirmed, contradicted, visited, known * cell, through * cell)
 
 
 class Network(CellMap):

@@ -360,10 +360,8 @@ class Tracker(abc.ABC):
 
     def poses_in_map(self) -> Float:
         """(n, 3) of all frames so far in the map as it is now: moved with it by each correction."""
-        return self._path.reported()
+        return self._path.poses()
 
     def trajectory(self) -> Trajectory:
         """The poses moved with the loops found so far where they tear the map, else as online."""
-        led = self._path.poses()
-        corrected = self._loops.corrected(led)
-        return self._path.trajectory(self._path.reported() if corrected is led else corrected)
+        return self._path.trajectory(self._loops.corrected(self._path.poses()))

@@ -30,6 +30,7 @@ from slam.tracker.standing.agreement import Agreement
 
 OFTEN_S = 1.0  # scans that come more seldom say nothing of what moves; set by hand
 STILL = np.diag([1e8, 1e8, 1e8])  # 1/m^2, 1/rad^2: a pose that does not move
+MOST_LOST = 100.0  # nats: seven scans that go on end any doubt; set by hand
 ENOUGH = 0.5  # of the novelty of a place far away, before it is taken; set by hand
 
 
@@ -110,7 +111,7 @@ class Belief:
         if doubt is None and odd:
             doubt = Doubt(cell_map, self._matcher)
         nats = self._goes_on(doubt, observations, match, share)
-        self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_NATS)
+        self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_LOST)
         if nats >= 0.0:
             self._matcher.usual.follow(match, observations, prediction.elapsed)
         else:  # by odometry: what it was matched to says nothing
@@ -119,9 +120,8 @@ class Belief:
         self._weigh([] if doubt is None else doubt.places.followed)
         if doubt is None and self.p_lost <= config.belief.frozen_above:
             return self._settled(cell_map, match, prediction)
-        everyone = observations.with_votes(None)
         doubt = self._doubt = doubt or Doubt(cell_map, self._matcher)
-        doubt.match, doubt.told = match, doubt.places.told(self._on_map(doubt, everyone, match))
+        doubt.match = match
         return self._searched(doubt, observations, prediction, nats)
 
     def _undragged(self, cell_map: CellMap, observations: Observations, match: Match) -> Match:
@@ -155,11 +155,11 @@ class Belief:
         most = config.belief.hidden * max(through_m - config.belief.hidden_m, 0.0)
         return max(nats, -most)
 
-    def _on_map(self, doubt: Doubt, everyone: Observations, match: Match) -> Match:
-        """What a match to the copy is on the map of before the doubt."""
+    def _on_map(self, doubt: Doubt, everyone: Observations) -> Match:
+        """What the match where motion led is on the map of before the doubt."""
         if doubt.local is doubt.cell_map:
-            return match
-        there = match.T_map_robot
+            return doubt.match
+        there = doubt.match.T_map_robot
         return self._matcher.climb(doubt.cell_map, everyone, there, there, STILL)
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
@@ -175,7 +175,7 @@ class Belief:
 
     def learn(self, judged: Judged) -> None:
         """The map took a scan in."""
-        self._matcher.usual.learn(judged.match, judged.prediction.elapsed)
+        self._matcher.usual.learn(judged.match)
 
     def _settled(self, cell_map: CellMap, match: Match, prediction: Prediction) -> Judged:
         self._doubt = None
@@ -198,6 +198,7 @@ class Belief:
         config, everyone = self._matcher.config, observations.with_votes(None)
         prices, frozen_above = config.matching.budget, config.belief.frozen_above
         budget = Budget(prices, prices.lost_share if self.p_lost > 0.5 else prices.frozen_share)
+        doubt.told = doubt.places.told(self._on_map(doubt, everyone))
         doubt.places.follow(everyone, prediction, budget)
         found = self._nearby(doubt, everyone, prediction, budget)
         if found is not None and self._is_slip(doubt, found, everyone):
@@ -253,10 +254,11 @@ class Belief:
         """Whether a likely place far away may be taken: after scans that are new."""
         config = self._matcher.config.belief
         asked = place.scans >= config.again and novelty(place.way) >= ENOUGH
+        explained = place.latest > 0.0 and self._unknown > 0.0 and place.waited == 0
         better = probabilities([0.0, place.latest - doubt.told])[1] >= 1.0 - config.frozen_above
-        better = better and place.latest > 0.0 and self._unknown > 0.0
-        more_m = gain_m(doubt.cell_map, everyone, place.match, doubt.match) if asked and better else 0.0
-        return place.waited == 0 and more_m >= config.far_m
+        if not (asked and explained and better):
+            return False
+        return gain_m(doubt.cell_map, everyone, place.match, doubt.match) >= config.far_m
 
     def _slipped(self, doubt: Doubt, found: Match, prediction: Prediction) -> Judged:
         """The robot is there, and its map goes on from there."""

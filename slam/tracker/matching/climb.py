@@ -197,7 +197,7 @@ class Numbers(NamedTuple):
 def _numbers(plain: tuple[Any, ...]) -> tuple[Reward, Climb]:
     r, c = plain[0], plain[1]
     return (
-        Reward(r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]),
+        Reward(r[0], r[1], r[2], r[3], r[4], r[5], r[6]),
         Climb(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]),
     )
 
@@ -224,13 +224,13 @@ def climbed(  # noqa: PLR0913 (kernel)
     pose: NDArray[np.float64],
     information: NDArray[np.float64],
     scratch: NDArray[np.float64],
-) -> tuple[float, float, float, float, float]:
+) -> tuple[float, float, float, float]:
     """Climb from ``pose``, which is changed, with observations of that ``weight`` in all, if any.
 
     ``every`` > 0: from where every so manieth of them leads, blurred by the ``prior``'s covariance;
     0: the prior is given by its inverse. ``plain``: ``Numbers``. ``few`` (``Seen``) and ``scratch``
     (``SCRATCH``): room to work in.
-    Returns weight of the reward, matched and overlapped share, score and reward.
+    Returns weight of the reward, matched and overlapped share, and score.
     """
     field, (reward, climb) = Field(directory, corner, x, y, facing), _numbers(plain)
     _, _, full, exponent, enough, least_weight, least, most = plain
@@ -251,7 +251,7 @@ def climbed(  # noqa: PLR0913 (kernel)
             for b in range(3):
                 precision[a, b] = prior[a, b]
     information[:] = 0.0
-    tau, matched, overlapped, score, rewarded = full, 0.0, 0.0, -math.inf, 0.0
+    tau, matched, overlapped, score = full, 0.0, 0.0, -math.inf
     while weight > 0.0:
         rewarded, of_prior, count, absent = refine(
             field, reward, climb, seen, pose, prediction, precision, tau, information, scratch
@@ -263,4 +263,4 @@ def climbed(  # noqa: PLR0913 (kernel)
         if tau < full or tempered > enough * tau:
             break
         tau = tempered
-    return tau, matched, overlapped, score, rewarded
+    return tau, matched, overlapped, score

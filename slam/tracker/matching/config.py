@@ -37,17 +37,10 @@ class ClimbConfig(Settings):
 
 @dataclass(frozen=True, kw_only=True)
 class UsualConfig(Settings):
-    """Which scans match worse than usual: those are worth a search, and the map is asked."""
+    """What matches were like."""
 
     remembered: int = number(50, "scans", "whose median matched share is usual", low=1, high=MANY)
-    odd: float = number(0.7, "share", "of the usual match: with less, the map is asked", high=1.0)
-    fallen: float = number(
-        0.8, "share", "of the usual reward: with less, the map is asked", high=1.0
-    )
-    fallen_s: float = number(1.0, "s", "memory of the usual reward", low=1e-3)
-    outvoted: float = number(
-        0.75, "vote", "mean weight of returns: above, a reward that fell means nothing", high=1.0
-    )
+    fallen_s: float = number(1.0, "s", "memory of what returns matched of late", low=1e-3)
 
 
 @dataclass(frozen=True, kw_only=True)

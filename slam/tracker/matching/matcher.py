@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Scan matching, Eq. (13): the pose whose observations overlap the map most, against the prior.
 
-By what matches were like so far it is told which scans are worth a search.
+By what matches were like so far it is told which scans go on from those before.
 """
 
 import math
@@ -56,7 +56,6 @@ class Match:
     tau          weight the reward had in the end
     searched     whether the wide search ran; ``evaluations`` candidate poses it scored
     slipped      whether it was found against the odometry
-    rewarded     reward for a unit of weight, by the votes of the returns
     """
 
     T_map_robot: Float
@@ -68,7 +67,6 @@ class Match:
     evaluations: int = 0
     slipped: bool = False
     overlapped: float = 0.0
-    rewarded: float = 0.0
 
 
 def unmatched(T_map_robot: Float, *, matched: float, score: float) -> Match:
@@ -102,8 +100,8 @@ class Usual:
     def __init__(self, config: UsualConfig, matches: Sequence[float] = ()) -> None:
         self._config = config
         self.matches: deque[float] = deque(matches, maxlen=config.remembered)
-        self._rewarded, self._overlapped = 0.0, 0.0
-        self._median: float | None = None  # asked for thrice a scan
+        self._overlapped = 0.0
+        self._median: float | None = None  # asked for more than once a scan
 
     @property
     def match(self) -> float:
@@ -117,10 +115,9 @@ class Usual:
         self.matches.extend(matches)
         self._median = None
 
-    def learn(self, match: Match, elapsed: float) -> None:
-        """The map took in a scan, so many s after the one before."""
+    def learn(self, match: Match) -> None:
+        """The map took in a scan."""
         self.know([match.matched])
-        self._rewarded += self._forgotten(elapsed) * (match.rewarded - self._rewarded)
 
     def follow(self, match: Match, observations: Observations, elapsed: float) -> None:
         """A scan was matched, to the map or to a local copy."""
@@ -130,18 +127,6 @@ class Usual:
     def _forgotten(self, elapsed: float) -> float:
         """Share of what is remembered of a second ago that a scan replaces."""
         return min(1.0 - math.exp(-elapsed / self._config.fallen_s), 0.3)
-
-    def is_odd(self, match: Match, observations: Observations) -> bool:
-        """Whether so little is matched, or so suddenly less, that the map in view is to be asked.
-
-        Returns that have no vote and a reward that fell are the sign of a slip: who slipped sees
-        what stands at places that were empty.
-        """
-        config = self._config
-        if match.matched < config.odd * self.match:
-            return True
-        fell = match.rewarded < config.fallen * self._rewarded
-        return fell and observations.mean_vote < config.outvoted
 
     def share(self, match: Match, observations: Observations) -> float:
         """Of what all returns, voting or not, matched in the second before: what matches now."""
@@ -166,7 +151,6 @@ class Matcher:
             log_floor=config.matching.log_floor,
             tail=config.matching.tail,
             tail_cells=config.matching.tail_cells,
-            young_trace=config.standing.young_trace,
         )
         self.numbers = config.matching
         steps, cell = self.numbers.climb, config.cell_m
@@ -256,7 +240,7 @@ class Matcher:
         """As the kernel ``climbed``."""
         cells, of = cell_map.cells, seen_by(observations)
         pose, information = np.array(start, dtype=np.float64), np.empty((3, 3))
-        tau, matched, overlapped, score, rewarded = climbed(
+        tau, matched, overlapped, score = climbed(
             cells.directory, cells.corner, cells.x, cells.y, cells.facing, self._plain,
             of.points, of.covariances, of.weights, of.tangents, of.facings, of.votes, weight,
             prediction, prior, every, self._few, pose, information, self._scratch,
@@ -264,7 +248,7 @@ class Matcher:
         pose[2] = se2.wrap(float(pose[2]))
         return Match(
             T_map_robot=pose, information=information, matched=matched, score=score, tau=tau,
-            overlapped=overlapped, rewarded=rewarded / weight if weight > 0.0 else 0.0,
+            overlapped=overlapped,
         )  # fmt: skip
 
     def search(

@@ -104,13 +104,6 @@ class KeyFrames:
         self._step, self._covariance = np.zeros(3), np.zeros((3, 3))
         self._found = False
 
-    def unwrite(self, since: int) -> None:
-        """Frames from number ``since`` on are not in the map: the robot was elsewhere."""
-        for k in range(len(self.keys) - 1, -1, -1):
-            if self.keys[k].frame < since:
-                break
-            self.keys[k] = replace(self.keys[k], written=False)
-
     def leave(self, merge: Merge) -> None:
         """Only the key frames that are left; a step is from the one before among them."""
         keys = merge.rows(self.keys)
