@@ -49,14 +49,14 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
     ),
     "matching.usual": ("fallen", "odd", "outvoted"),
     "standing": (
-        "alert_m", "better", "doubtful_m", "explains", "fallen", "fallen_s", "long_window_s", "outvoted",
-        "rival_gain", "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans",
+        "alert_m", "better", "doubtful_m", "explains", "fallen", "fallen_s", "long_window_s",
+        "outvoted", "rival_gain", "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans",
         "undecided_s", "young_trace",
     ),
     "tracking.relocalise": (
         "alias", "alone", "denied_here", "drift_m", "drift_rad", "enough", "enough_last",
-        "enough_later", "farthest_m", "farthest_rad", "few_vote", "hopeless", "kept", "last", "later",
-        "on_m", "on_rad", "on_s", "pushed_mps", "pushed_radps", "scans", "slipped_m",
+        "enough_later", "farthest_m", "farthest_rad", "few_vote", "hopeless", "kept", "last",
+        "later", "on_m", "on_rad", "on_s", "pushed_mps", "pushed_radps", "scans", "slipped_m",
         "slipped_rad", "sure",
     ),
 }  # fmt: skip

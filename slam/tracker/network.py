@@ -83,7 +83,7 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
 
 
 @uncounted
-def integrate(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
+def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
     arrays: tuple[Any, ...],
     plain_view: tuple[Any, ...],
     T_map_laser: NDArray[np.float64],

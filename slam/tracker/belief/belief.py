@@ -185,7 +185,7 @@ class Belief:
         )
 
     def _weigh(self, places: list[Place]) -> list[float]:
-        """Probabilities of these places, against where motion led and any other. Sets ``p_lost``."""
+        """Probabilities of these places; of what is left, ``p_lost`` is that of not the motion."""
         weights = [0.0, self._unknown, *(self._unknown + place.nats for place in places)]
         of_motion, _, *others = probabilities(weights)
         self.p_lost = max(0.0, 1.0 - of_motion)

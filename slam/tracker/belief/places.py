@@ -1,9 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Other places where the robot may be, each followed from scan to scan.
 
-They come from a search nearby and from a search of the whole map; each is carried along by odometry
-and matched to the scans, which say how much of them the map explains there. A scan does no more of this than its budget allows: the search goes on
-over the scans that follow, and where there are many places, they are matched by turns.
+They come from a search of the whole map; each is carried along by odometry and matched to the
+scans, which say how much of them the map explains there. A scan does no more of this than its
+budget allows: the search goes on over the scans that follow, and where there are many places, they
+are matched by turns.
 """
 
 import math
@@ -22,7 +23,6 @@ from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.matching.whole_search import WholeSearch
-
 
 ANEW = np.array([0.3, 0.35, 1.0])  # m, rad or s moved: another scan is as good as new; by hand
 LEAST = 1e-3  # share: numerical guard

@@ -91,7 +91,7 @@ def _bell(a: float, b: float, d: float, tail: float, tail_cells: float) -> Bell:
 
 
 @inlined
-def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
+def _overlap(  # noqa: C901, PLR0915 (kernel)
     field: Field,
     short_term: float,
     u: float,
