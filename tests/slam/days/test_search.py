@@ -80,15 +80,12 @@ def test_outside_the_map_nothing_is_found(home):
 
 def test_a_place_that_is_found_late_is_asked_for_the_scans_before(home):
     """What is kept of them is part of them all; one that lags far behind is hopeless."""
-    search, found, _ = searched(home, (HALL, NICHE), AROUND)
-    assert found is not None
+    search, world = StartSearch(home, Past(History(cell_m=0.1))), World2D(np.vstack((HALL, NICHE)))
+    for frame in frames(world, AROUND, rate_hz=5.0, spec=laser(181), seed=9):
+        search.take(frame.without_truth())
     pose, places = search._before[1], search._places
-    (best,) = (
-        one
-        for one, start in zip(places.followed, search.starts(), strict=True)
-        if start.probability > 0.5
-    )
-    there = se2.compose(found, pose)
+    best = max(places.followed, key=lambda one: one.nats)
+    there = best.match.T_map_robot
     late = Place(match=unmatched(there, matched=1.0, score=0.0), nats=1.0)
     beside = np.array([1.0, 1.0, 1.0])
     match = unmatched(se2.compose(there, beside), matched=1.0, score=0.0)

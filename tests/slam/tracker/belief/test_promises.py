@@ -85,10 +85,15 @@ def test_a_carried_robot_is_found_and_at_no_wrong_place(kind: type[Tracker], pla
     assert set(said[:found]) <= {"lost", "frozen"}
     assert "lost" in said[:3]
     assert said[-1] == "tracking"
-    for frame, one in after[found:]:
-        assert one.converged
-        assert off_m(one, frame.truth) < 0.05
-        assert one.diagnostics["p_lost"] < 0.01
+    for k, (frame, one) in enumerate(after):
+        error = off(one, frame.truth)
+        if said[k] == "lost":  # it says that it may be anywhere that it has seen
+            assert error @ np.linalg.solve(one.covariance, error) < 11.3  # 3 numbers, 99 %
+        if k >= found:
+            assert one.converged
+            assert off_m(one, frame.truth) < 0.05
+            assert one.diagnostics["p_lost"] < 0.01
+    assert one.covariance[0, 0] < 0.1**2
 
 
 @pytest.mark.parametrize("kind", SLAMS)
@@ -192,19 +197,6 @@ def test_a_standing_robot_that_is_shoved_is_followed_or_says_that_it_is_lost() -
         if estimate.converged:
             assert off_m(estimate, aside) < 0.015
             assert abs(off(estimate, aside)[2]) < math.radians(0.4)
-
-
-def test_the_covariance_of_a_lost_robot_covers_all_that_it_has_seen() -> None:
-    _, after = carried(ShuntingSlam, ROOMS, PLACE)
-    lost = 0
-    for frame, one in after:
-        error = off(one, frame.truth)
-        if one.diagnostics["state"] == "lost":
-            lost += 1
-            assert error @ np.linalg.solve(one.covariance, error) < 11.3  # 3 numbers, 99 %
-    assert lost
-    assert one.covariance[0, 0] < 0.1**2  # found
-    assert off_m(one, frame.truth) < 0.05
 
 
 @pytest.mark.xfail(strict=True, reason="what is hidden denies nothing, and no search is made")
