@@ -47,6 +47,7 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
         "pulled_m", "pulled_rad", "searched", "slip_m", "slip_rad", "slips_per_m", "through",
         "through_per_m", "unsearched", "vanished",
     ),
+    "matching.budget": ("weigh_ns",),
     "matching.usual": ("fallen", "odd", "outvoted"),
     "standing": (
         "alert_m", "better", "doubtful_m", "explains", "fallen", "fallen_s", "long_window_s",

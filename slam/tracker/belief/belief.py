@@ -130,6 +130,8 @@ class Belief:
         config, agreement = self._matcher.config, self._agreement
         if not 0.0 < config.standing.disagreed < agreement.denied:
             return match
+        if not observations.tangents.any():  # points: no surface tells whether odometry is right
+            return match
         back = unmatched(agreement.led(match.T_map_robot), matched=match.matched, score=0.0)
         old = cell_map if self._doubt is None else self._doubt.cell_map
         if gain_m(old, observations, match, back) >= config.belief.more_m:

@@ -105,7 +105,6 @@ class BudgetConfig(Settings):
         20_000.0, "ns", "to approach a place just found, by each of climb.few points", PRICE,
         low=1.0,
     )  # fmt: skip
-    weigh_ns: float = number(100.0, "ns", "to weigh a cell that a scan sees", NEWER, low=1.0)
     known_share: float = number(
         0.5, "share", "of what is counted: most that is spent on hypotheses that are followed",
         high=1.0,

@@ -112,13 +112,15 @@ class Usual:
         return self._median
 
     def know(self, matches: Sequence[float]) -> None:
-        """So scans of before matched."""
+        """So scans of before matched, from which the next one is to go on."""
         self.matches.extend(matches)
         self._median = None
+        self._overlapped = self.match if matches else self._overlapped
 
     def learn(self, match: Match) -> None:
         """The map took in a scan."""
-        self.know([match.matched])
+        self.matches.append(match.matched)
+        self._median = None
 
     def follow(self, match: Match, observations: Observations, elapsed: float) -> None:
         """A scan was matched, to the map or to a local copy."""

@@ -12,7 +12,7 @@ from scripts.days.tables import last_session, printed
 from scripts.days.truth import Spot, Still, ages_of, scored, stands_there, verdicts
 from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.days.changes import Change
-from slam.tracker.belief.status import Status
+from slam.tracker.belief.state import State
 
 
 def spot(x, name, *, came=False, seen=True, asked=True, door=False):
@@ -100,10 +100,10 @@ def test_an_age_counts_sessions_back_and_a_session_that_lay_apart_makes_it_older
     assert list(ages_of([4], 5)) == [(1, 4)]
 
 
-def test_the_verdict_is_asked_where_the_room_clearly_changed_and_where_it_did_not():
-    outdated, tracking = Status.OUTDATED.value, Status.TRACKING.value
+def test_whether_the_map_is_outdated_is_asked_where_the_room_clearly_changed_and_where_it_did_not():
+    outdated, tracking = State.OUTDATED.value, State.TRACKING.value
     said = [outdated, outdated, tracking, outdated, tracking]
-    estimates = [SimpleNamespace(diagnostics={"verdict": word}) for word in said]
+    estimates = [SimpleNamespace(diagnostics={"state": word}) for word in said]
     shares = np.array([0.9, 0.2, 0.3, 0.0, 0.0])
     assert verdicts(estimates, shares, 1) == {"outdated_told": 0.5, "outdated_false": 0.5}
     assert verdicts(estimates, np.full(5, 0.05), 0) == {

@@ -1,7 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Where a session starts: one belief weighs all places; and whether what it saw fits the past."""
+"""Where a session starts: scans weigh all places; and whether what it saw fits the past."""
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -11,7 +12,8 @@ from slam.days.evidence import Snapshot
 from slam.days.history import History
 from slam.days.search import KNOWN, SPOILS, Agreement, Past, StartSearch
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.tracker.matching.budget import Budget
+from slam.tracker.belief.places import Place
+from slam.tracker.matching.matcher import unmatched
 from tests.world2d import Drive, World2D, frames, laser, rectangle, wander
 
 CONFIG = ShuntingConfig(cell_m=0.05, trace_s=2.5)
@@ -77,26 +79,29 @@ def test_outside_the_map_nothing_is_found(home):
 
 
 def test_a_place_that_is_found_late_is_asked_for_the_scans_before(home):
-    """Its evidence is that of a place which was followed from the first scan on."""
-    search, found, _ = searched(home, (HALL, NICHE), AROUND)
-    assert found is not None
-    (followed,) = [
-        one
-        for one, start in zip(search._places.followed, search.starts(), strict=True)
-        if start.probability > 0.5
-    ]
-    before = followed.evidence.known_m
-    pose = search._before[1]
-    one = search._kept[-1].observations
-    match = home.matched(one, se2.compose(found, pose), np.diag([0.01, 0.01, 0.001]))
-    late = search._places.begun(one, match, Budget(home.config.matching.budget, 1.0))
-    assert late.evidence.known_m < before
-    search._places.followed.clear()
-    search._join(late, pose)
+    """What is kept of them is part of them all; one that lags far behind is hopeless."""
+    search, world = StartSearch(home, Past(History(cell_m=0.1))), World2D(np.vstack((HALL, NICHE)))
+    for frame in frames(world, AROUND, rate_hz=5.0, spec=laser(181), seed=9):
+        search.take(frame.without_truth())
+    pose, places = search._before[1], search._places
+    best = max(places.followed, key=lambda one: one.nats)
+    there = best.match.T_map_robot
+    late = Place(match=unmatched(there, matched=1.0, score=0.0), nats=1.0)
+    beside = np.array([1.0, 1.0, 1.0])
+    match = unmatched(se2.compose(there, beside), matched=1.0, score=0.0)
+    denied = replace(late, match=match, nats=-100.0)
+    places.followed.clear()
+    for new in (late, denied):
+        search._join(new, pose)
     while search._late:
         search._ask(pose)
-    (again,) = search._places.followed
-    assert again.evidence.known_m == pytest.approx(before, rel=0.2)
+    (again,) = places.followed
+    assert 0.4 * best.nats < again.nats <= best.nats
+    np.testing.assert_allclose(again.match.T_map_robot, there, atol=1e-9)
+    hopeless = se2.compose(search._hopeless[-1], pose)
+    np.testing.assert_allclose(hopeless, se2.compose(there, beside), atol=1e-9)
+    search._join(denied, pose)  # not again
+    assert not search._late
 
 
 CELL = 0.1

@@ -75,13 +75,14 @@ def test_where_a_box_has_come_overnight_the_map_is_outdated(first, tmp_path) -> 
         session = Session.open(path, ShuntingSlam, time_s=DAY_S + NINE)
         estimates, _ = driven(session, world, drive, seed=9)
         assert session.state.found_after_s is not None
-        said.append([e.diagnostics["verdict"] for e in estimates if e.converged])
+        said.append([e.diagnostics["state"] for e in estimates if e.converged])
         assert all(0.0 <= e.diagnostics["news"] <= 1.0 for e in estimates if e.converged)
     assert said[0].count("map outdated here") == 0
     assert said[1][0] == "map outdated here"
     assert said[1][-1] == "tracking"  # the map has learnt it
 
 
+@pytest.mark.xfail(strict=True, reason="one box outweighs all else if the robot drives for long")
 def test_in_a_room_alike_after_half_a_turn_nothing_is_found(tmp_path) -> None:
     """A box that has come, and one that has gone, cannot tell: both ends are as good."""
     path = tmp_path / "m.npz"

@@ -81,11 +81,11 @@ def test_a_robot_that_was_carried_off_finds_itself_in_the_loaded_map(
     saved: tuple[Path, ShuntingSlam, list[Frame]],
 ) -> None:
     slam = ShuntingSlam.load(saved[0])
-    drive = Drive((2.0, -2.0, 2.0), ((0.2, 0.3, 6.0),))
+    drive = Drive((3.0, 2.5, -1.0), ((0.2, 0.3, 4.0),))
     for frame in frames(ROOMS, drive, rate_hz=5.0, seed=9):
         estimate = slam.update(frame.without_truth())
+        assert not estimate.converged or abs(estimate.T_map_robot - frame.truth).max() < 0.05
     assert estimate.converged
-    np.testing.assert_allclose(estimate.T_map_robot, frame.truth, atol=0.03)
 
 
 def test_an_empty_map_is_a_map(tmp_path: Path) -> None:
@@ -248,6 +248,24 @@ def test_a_map_of_before_one_belief_is_read(
     config["standing"]["falen"] = 0.8
     with pytest.raises(LogFormatError, match="falen"):
         ShuntingSlam.load(rewritten(path, tmp_path / "typo.npz", config=config))
+
+
+def test_a_map_of_before_shares_were_weighed_is_read(
+    saved: tuple[Path, ShuntingSlam, list[Frame]], tmp_path: Path
+) -> None:
+    with np.load(saved[0]) as archive:
+        config = json.loads(str(archive["header"]))["config"]
+    for number in ("again", "best", "far_m", "hidden", "hidden_m", "known", "more_m", "new"):
+        del config["belief"][number]
+    gone = "alike breaks broken confirmed confirmed_m goes_on linear_m nearby_per_m outdated place"
+    gone += " pulled_m pulled_rad searched slip_m slip_rad slips_per_m through unsearched vanished"
+    config["belief"] |= dict.fromkeys(gone.split(), 0.5) | {"frozen_above": 0.02}
+    config["matching"]["usual"] |= {"fallen": 0.8, "odd": 0.7, "outvoted": 0.75}
+    config["matching"]["budget"] |= {"weigh_ns": 100.0}
+    config["standing"] |= {"alert_m": 0.5, "young_trace": 0.5}
+    config["tracking"]["relocalise"] |= {"kept": 20}
+    back = ShuntingSlam.load(rewritten(saved[0], tmp_path / "old.npz", config=config))
+    assert back.config == CONFIG.changed({"belief.frozen_above": 0.02})
 
 
 def test_a_small_file_that_unpacks_to_very_much_is_refused(

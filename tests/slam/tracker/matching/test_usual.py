@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What matches were like so far, and which scan is odd by that."""
+"""What matches were like so far, and which scans go on from those before."""
 
 from dataclasses import replace
 from types import SimpleNamespace
@@ -16,65 +16,44 @@ STEP_S = 0.2
 LONG = round(10.0 * CONFIG.fallen_s / STEP_S)  # scans after which nothing of before is remembered
 
 
-def match(matched: float = 0.8, *, overlapped: float = 0.8, rewarded: float = 0.5) -> Match:
+def match(matched: float = 0.8, *, overlapped: float = 0.8) -> Match:
     return Match(
         T_map_robot=np.zeros(3), information=np.eye(3), matched=matched, score=0.0, tau=1.0,
-        overlapped=overlapped, rewarded=rewarded,
+        overlapped=overlapped,
     )  # fmt: skip
 
 
-def voting(vote: float, in_view: float = 1.0) -> Any:
+def seeing(in_view: float) -> Any:
     """Observations, as far as they are asked."""
-    return SimpleNamespace(mean_vote=vote, in_view=in_view)
+    return SimpleNamespace(in_view=in_view)
 
 
-ALL = voting(1.0)
+ALL = seeing(1.0)
 
 
 def settled(of: Match, step_s: float = STEP_S, scans: int = LONG) -> Usual:
     usual = Usual(CONFIG)
     for _ in range(scans):
-        usual.learn(of, step_s)
+        usual.learn(of)
         usual.follow(of, ALL, step_s)
     return usual
 
 
 def test_the_usual_match_is_the_median_of_the_latest() -> None:
+    assert Usual(CONFIG).match == 1.0  # before anything is known all is expected to match
     usual = Usual(replace(CONFIG, remembered=3), [0.1])
     assert usual.match == 0.1
     for matched in (0.9, 0.5, 0.7, 0.8):
-        usual.learn(match(matched), STEP_S)
+        usual.learn(match(matched))
     assert list(usual.matches) == [0.5, 0.7, 0.8]
     assert usual.match == 0.7
-
-
-def test_before_anything_is_known_all_is_expected_to_match() -> None:
-    assert Usual(CONFIG).match == 1.0
-    assert Usual(CONFIG).is_odd(match(0.9 * CONFIG.odd), voting(1.0))
-    assert not Usual(CONFIG).is_odd(match(1.1 * CONFIG.odd), voting(1.0))
-
-
-def test_a_match_far_below_the_usual_is_odd_whoever_votes() -> None:
-    usual = settled(match(0.6))
-    for vote in (0.0, 1.0):
-        assert usual.is_odd(match(0.59 * CONFIG.odd), voting(vote))
-        assert not usual.is_odd(match(0.61 * CONFIG.odd), voting(vote))
-
-
-def test_a_reward_that_fell_is_odd_where_returns_lost_their_votes() -> None:
-    """That is a slip; where all vote, it is something new."""
-    usual, few, all_ = settled(match()), voting(0.9 * CONFIG.outvoted), voting(1.0)
-    fell = match(rewarded=0.5 * 0.95 * CONFIG.fallen)
-    assert usual.is_odd(fell, few)
-    assert not usual.is_odd(fell, all_)
-    assert not usual.is_odd(match(rewarded=0.5 * 1.05 * CONFIG.fallen), few)
 
 
 def test_a_share_is_of_what_the_second_before_matched() -> None:
     usual = settled(match(overlapped=0.8))
     assert usual.share(match(overlapped=0.8), ALL) == pytest.approx(1.0, abs=1e-3)
     assert usual.share(match(overlapped=0.2), ALL) == pytest.approx(0.25, abs=1e-3)
-    usual.learn(match(overlapped=0.1), STEP_S)  # the map took it in: that alone says nothing
+    usual.learn(match(overlapped=0.1))  # the map took it in: that alone says nothing
     assert usual.share(match(overlapped=0.8), ALL) == pytest.approx(1.0, abs=1e-3)
     for _ in range(LONG):  # the scans that follow are what goes on
         usual.follow(match(overlapped=0.2), ALL, STEP_S)
@@ -107,8 +86,8 @@ def test_what_was_not_in_view_before_need_not_go_on() -> None:
     usual = settled(match(overlapped=0.8))
     turned = match(overlapped=0.2)
     assert usual.share(turned, ALL) < 0.3
-    assert usual.share(turned, voting(1.0, in_view=0.25)) == pytest.approx(1.0, abs=1e-3)
-    assert usual.share(match(overlapped=0.9), voting(1.0, in_view=0.5)) < 1.3
+    assert usual.share(turned, seeing(0.25)) == pytest.approx(1.0, abs=1e-3)
+    assert usual.share(match(overlapped=0.9), seeing(0.5)) < 1.3
 
 
 def test_nothing_before_is_no_division_by_nothing() -> None:
