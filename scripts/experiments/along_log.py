@@ -5,7 +5,7 @@ It takes ``slam`` from the folder in which it is started, whatever commit is che
 nothing else of this project. The archive has a row a scan: ``stamps_ns``, poses ``online`` and
 ``final`` (n, 3) in the map, ``odometry`` and ``reference`` (n, 3; NaN where nobody measured it),
 ``covariance`` (n, 3, 3), ``converged``, and ``spent_ms`` of processor time, NaN where a kernel was
-compiled or loaded meanwhile.
+compiled or loaded meanwhile. Stamps are those of the recording.
 """
 
 import argparse
@@ -25,34 +25,50 @@ def options() -> argparse.ArgumentParser:
     parser.add_argument("--config", type=json.loads, default={}, help="numbers by path, JSON")
     parser.add_argument("--laser", type=json.loads, help="[x m, y m, theta rad] on the robot")
     parser.add_argument("--scan", help="topic of the scans of a bag")
+    parser.add_argument("--every", type=int, default=1, help="take one scan of so many")
+    parser.add_argument("--backwards", action="store_true", help="from the last scan to the first")
     return parser
 
 
-def run(log: Path, slam: str, config: Any, laser: Any, scan: str | None) -> dict[str, Any]:
+def frames_of(given: argparse.Namespace) -> Any:
+    """The stream of a log, its scanner where it is on the robot; perhaps not all, or reversed."""
+    import numpy as np
+
+    from slam.logs import open_log, read_bag
+
+    stream = read_bag(given.log, scan=given.scan) if given.scan else open_log(given.log)
+    specs: dict[int, Any] = {}  # one object for all scans, as a SLAM may keep tables of it
+
+    def mounted(frame: Any) -> Any:
+        spec = frame.scan.spec
+        if id(spec) not in specs:
+            laser = np.array(given.laser, dtype=np.float64)
+            specs[id(spec)] = spec, replace(spec, T_robot_laser=laser)
+        return replace(frame, scan=replace(frame.scan, spec=specs[id(spec)][1]))
+
+    def back(frame: Any) -> Any:
+        ns = -frame.stamp_ns
+        at = replace(frame.odometry, stamp_ns=ns), replace(frame.scan, stamp_ns=ns)
+        return replace(frame, stamp_ns=ns, odometry=at[0], scan=at[1])
+
+    frames = [mounted(frame) if given.laser else frame for frame in stream][:: given.every]
+    if given.backwards:
+        frames = [back(frame) for frame in reversed(frames)]
+    return replace(stream, frames=lambda: frames, length=len(frames))
+
+
+def run(given: argparse.Namespace) -> dict[str, Any]:
     """The arrays of the archive."""
     import numpy as np
     from numba.core import event
 
     from slam.frames import EPOCH
-    from slam.logs import open_log, read_bag
     from slam.replay import Replay
     from slam.system import create
 
-    stream = read_bag(log, scan=scan) if scan else open_log(log)
-    specs: dict[int, Any] = {}  # one object for all scans, as a SLAM may keep tables of it
-
-    def mounted(frame: Any) -> Any:
-        spec = frame.scan.spec
-        key = id(spec)
-        if key not in specs:
-            specs[key] = spec, replace(spec, T_robot_laser=np.array(laser, dtype=np.float64))
-        return replace(frame, scan=replace(frame.scan, spec=specs[key][1]))
-
-    if laser is not None:
-        inner = stream
-        stream = replace(stream, frames=lambda: map(mounted, inner.frames()))
-    replay = Replay.of({slam: create(slam, **({"config": config} if config else {}))})
-    track, loaded, odometry, reference = replay.tracks[slam], [], [], []
+    stream, config = frames_of(given), {"config": given.config} if given.config else {}
+    replay = Replay.of({given.slam: create(given.slam, **config)})
+    track, loaded, odometry, reference = replay.tracks[given.slam], [], [], []
     with event.install_recorder("numba:compiler_lock") as compiled:
         for frame in replay.run(stream):
             loaded.append(len(compiled.buffer))
@@ -62,8 +78,9 @@ def run(log: Path, slam: str, config: Any, laser: Any, scan: str | None) -> dict
     final = track.final() or online
     spent_ms = 1e3 * np.array(track.durations_s)
     spent_ms[np.diff(loaded, prepend=0) > 0] = np.nan
+    stamps_ns = -online.stamps_ns if given.backwards else online.stamps_ns
     return {
-        "stamps_ns": online.stamps_ns + int(stream.metadata.extra.get(EPOCH, 0)),
+        "stamps_ns": stamps_ns + int(stream.metadata.extra.get(EPOCH, 0)),
         "online": online.poses,
         "final": final.poses,
         "odometry": np.array(odometry) if stream.metadata.odometry else online.poses * np.nan,
@@ -80,8 +97,7 @@ def main() -> None:
     sys.path[:] = [str(Path.cwd()), *sys.path[1:]]  # this file's folder has modules of other names
     import numpy as np
 
-    arrays = run(given.log, given.slam, given.config, given.laser, given.scan)
-    np.savez_compressed(given.out, **arrays)
+    np.savez_compressed(given.out, **run(given))
 
 
 if __name__ == "__main__":

@@ -14,6 +14,7 @@ from slam.frames import Float
 
 HEAD, HEAD_M = 50, 2.0  # scans at the beginning on which a run is laid on its reference, at least
 FOUND_M, FOUND_RAD = 0.5, 0.2  # the pose of a carried robot stands right
+TRUTH_M = 0.01  # of true poses: the lever of what they are of, and the clock
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -40,10 +41,15 @@ def steps(poses: Float) -> list[Float]:
     return [se2.between(a, b) for a, b in pairwise(poses)]
 
 
-def jumps_m(run: Run) -> Float:
-    """(n - 1,) m, each step of the reported pose beyond that of odometry; NaN without one."""
-    pairs = zip(steps(run.online), steps(run.odometry), strict=True)
-    return np.array([np.hypot(*se2.between(a, b)[:2]) for a, b in pairs])
+def beyond_odometry(run: Run) -> Float:
+    """(n - 1, 3) what each step of the reported pose has more than that of odometry."""
+    pairs = zip(steps(run.odometry), steps(run.online), strict=True)
+    return np.array([se2.between(odometry, step) for odometry, step in pairs])
+
+
+def large(off: Float) -> NDArray[np.bool_]:
+    """(n,) which of (n, 3) are no place at which a robot that was carried counts as found."""
+    return (np.hypot(off[:, 0], off[:, 1]) > FOUND_M) | (np.abs(off[:, 2]) > FOUND_RAD)
 
 
 def head_of(reference: Float, carried: int | None) -> slice:
@@ -62,22 +68,30 @@ def errors(poses: Float, reference: Float, head: slice) -> Float:
     return off
 
 
-def found_s(seconds: Float, off: Float, carried: int) -> float:
-    """s from the carrying until the pose stands right for good; infinite where it never does."""
-    wrong = (np.hypot(off[:, 0], off[:, 1]) > FOUND_M) | (np.abs(off[:, 2]) > FOUND_RAD)
+def found_at(wrong: NDArray[np.bool_], carried: int) -> int:
+    """The first scan from the carrying on after which none is wrong; ``len(wrong)``: never."""
     last = np.flatnonzero(wrong[carried:])
-    first = carried + (int(last[-1]) + 1 if len(last) else 0)
-    return float(seconds[first] - seconds[carried]) if first < len(seconds) else float("inf")
+    return carried + (int(last[-1]) + 1 if len(last) else 0)
 
 
-def nees(online: Float, covariance: Float, truth: Float, head: slice) -> float:
-    """Median over the scans of e' P^-1 e, with e by ``head``; 2.37 where P is right."""
-    T = se2.fit(truth[head, :2], online[head, :2])
-    off = online - np.column_stack([se2.transform(T, truth[:, :2]), truth[:, 2] + T[2]])
-    off[:, 2] = se2.wrap_array(off[:, 2])
-    known = np.linalg.det(covariance) > 0.0
-    weighed = np.linalg.solve(covariance[known], off[known, :, None])[:, :, 0]
-    return float(np.median((off[known] * weighed).sum(axis=1)))
+def found(run: Run, found: int, carried: int) -> dict[str, float]:
+    """s from the carrying until then, and the share of scans that were trusted meanwhile."""
+    ever = found < len(run.online)
+    return {
+        "found_s": abs(float(run.seconds[found] - run.seconds[carried])) if ever else float("inf"),
+        "hazard": float(run.converged[carried:found].sum() / len(run.online)),
+    }
+
+
+def nees(online: Float, covariance: Float, truth: Float) -> float:
+    """Median over the scans of the position's e' P^-1 e; 1.39 where P is right.
+
+    Laid on the truth by all scans, whose own frame is known to ``TRUTH_M``, which is part of P.
+    """
+    T = se2.fit(truth[:, :2], online[:, :2])
+    off = online[:, :2] - se2.transform(T, truth[:, :2])
+    P = covariance[:, :2, :2] + TRUTH_M**2 * np.eye(2)
+    return float(np.median((off * np.linalg.solve(P, off[:, :, None])[:, :, 0]).sum(axis=1)))
 
 
 def truth_of(path: Path, seconds: Float) -> Float:

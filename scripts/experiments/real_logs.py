@@ -15,7 +15,7 @@ import math
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -24,19 +24,25 @@ import numpy as np
 
 from scripts.console import ended
 from scripts.experiments import along_log, relations, revisits
-from scripts.experiments.judging import Run, errors, found_s, head_of, jumps_m, nees, truth_of
+from scripts.experiments.judging import (
+    Run,
+    beyond_odometry,
+    errors,
+    found,
+    found_at,
+    head_of,
+    large,
+    nees,
+    truth_of,
+)
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
 from scripts.marks import table
 from scripts.names import file_name
 from slam.errors import InvalidValueError, SlamFailedError
-from slam.evaluation import metrics
 from slam.files import write_bytes, write_text
-from slam.frames import Float, Stream
-from slam.logs import open_log, read_bag
-from slam.logs.mounting import remounted
+from slam.frames import Float
 from slam.shaped import one_of
-from slam.trajectory import Trajectory
 
 Row = dict[str, Any]
 HAZARD_M, JUMP_M = 1.0, 0.5  # trusted and farther off; a step is a jump
@@ -116,41 +122,31 @@ def unpacked(file: Path, folder: Path) -> Path:
 def against(run: Run, reference: Float, log: Log) -> Row:
     """The columns of a log with a reference."""
     known = np.isfinite(reference).all(axis=1)
-    stamps = run.stamps_ns[known]
-    truth = Trajectory(stamps_ns=stamps, poses=reference[known])
+    truth = reference[known]
     row: Row = {}
     for name, poses in (("online_m", run.online), ("final_m", run.final)):
-        track = Trajectory(stamps_ns=stamps, poses=poses[known])
-        row[name] = metrics.ate(track, truth, align="se2").value
-    head = head_of(truth.poses, log.carried)
-    off = errors(run.online[known], truth.poses, head)
+        squares = errors(poses[known], truth, slice(None))[:, :2] ** 2
+        row[name] = math.sqrt(float(squares.sum(axis=1).mean()))
+    off = errors(run.online[known], truth, head_of(truth, log.carried))
     far = np.hypot(off[:, 0], off[:, 1]) > HAZARD_M
     row["hazard"] = float((run.converged[known] & far).mean())
     if log.carried is not None:
-        row["found_s"] = found_s(run.seconds[known], off, log.carried)
+        row["found_s"] = found(run, found_at(large(off), log.carried), log.carried)["found_s"]
     if log.truth is not None:
-        row["nees"] = nees(run.online[known], run.covariance[known], truth.poses, head)
+        row["nees"] = nees(run.online[known], run.covariance[known], truth)
     return row
 
 
-def by_itself(run: Run, log: Log, file: Path) -> Row:
+def by_itself(run: Run, log: Log, given: argparse.Namespace) -> Row:
     """The columns of a log without a reference: by its own scans where the robot is back."""
-    frames = list(opened(log, file))
+    frames = list(along_log.frames_of(given))
     told = revisits.judged(frames, run.seconds, run.final, log.carried)
     row: Row = {"revisits": told.count, "revisits_cm": told.apart_cm}
     if log.carried is not None:
-        off = errors(run.online, run.final, slice(0, log.carried))
         sure = told.count >= LEAST_REVISITS and (told.apart_cm or 0.0) < SAME_CM
-        row["found_s"] = found_s(run.seconds, off, log.carried) if sure else math.inf
+        wrong = np.append(large(beyond_odometry(run)), not sure)  # until the last jump, or always
+        row |= found(run, found_at(wrong, log.carried), log.carried)
     return row
-
-
-def opened(log: Log, file: Path) -> Stream:
-    """The log, its scanner where it is on the robot."""
-    stream = read_bag(file, scan=log.scan) if log.scan else open_log(file)
-    if log.laser is None:
-        return stream
-    return remounted(stream, np.array(log.laser), flip=False, by="this study")
 
 
 def by_relations(run: Run, log: Log, data: Path) -> Row:
@@ -166,14 +162,17 @@ def by_relations(run: Run, log: Log, data: Path) -> Row:
     return row
 
 
-def judged(run: Run, log: Log, data: Path, file: Path) -> Row:
-    """All columns of one run."""
+def judged(run: Run, log: Log, data: Path, given: argparse.Namespace) -> Row:
+    """All columns of a run; ``given``: the options of ``along_log``."""
+    if log.carried is not None:
+        carried = -(-log.carried // given.every)
+        log = replace(log, carried=len(run.online) - carried if given.backwards else carried)
     reference = run.reference if log.truth is None else truth_of(data / log.truth, run.seconds)
     referred = bool(np.isfinite(reference).any())
-    row = against(run, reference, log) if referred else by_itself(run, log, file)
+    row = against(run, reference, log) if referred else by_itself(run, log, given)
     row |= {"scans": len(run.online), "trusted": float(run.converged.mean())}
     if np.isfinite(run.odometry).all():
-        jumps = jumps_m(run)
+        jumps = np.hypot(*beyond_odometry(run)[:, :2].T)
         row |= {"jump_m": float(jumps.max()), "jumps": int((jumps > JUMP_M).sum())}
     spent = run.spent_ms[FIRST:][np.isfinite(run.spent_ms[FIRST:])]
     if len(spent):
@@ -207,15 +206,24 @@ def cases(wanted: argparse.Namespace) -> list[tuple[Row, Job]]:
         words = ["--slam", slam, "--config", json.dumps(wanted.config)]
         words += ["--laser", json.dumps(log.laser)] if log.laser else []
         words += ["--scan", log.scan] if log.scan else []
+        words += ["--every", str(wanted.every)] if wanted.every != 1 else []
+        words += ["--backwards"] if wanted.backwards else []
+        way = "".join(f", {word}" for word in way_of(wanted))
         told = slam + (json.dumps(wanted.config) if wanted.config else "")
         job = Job(
-            name=file_name(f"{name}_{commit}_{told}")[:150],
+            name=file_name(f"{name}{way}_{commit}_{told}")[:150],
             call=along,
             arguments={"code": str(code.resolve()), "log": str(file), "words": words},
             code=(code.resolve() / "slam", Path(along_log.__file__), file),
         )
-        found.append(({"log": name, "code": commit, "slam": told}, job))
+        found.append(({"log": name + way, "code": commit, "slam": told}, job))
     return found
+
+
+def way_of(wanted: argparse.Namespace) -> list[str]:
+    """How else than whole and forwards a log is taken."""
+    every = [f"every {wanted.every}"] if wanted.every != 1 else []
+    return [*every, *["backwards"] * wanted.backwards]
 
 
 def kept(path: Path, rows: Sequence[Row]) -> list[Row]:
@@ -227,7 +235,7 @@ def kept(path: Path, rows: Sequence[Row]) -> list[Row]:
     new = [{key: told(key, row) for key in COLUMNS} for row in rows]
     every = {tuple(row[key] for key in KEYS): row for row in (*old, *new)}
     order = list(LOGS)
-    return sorted(every.values(), key=lambda row: order.index(row["log"]))
+    return sorted(every.values(), key=lambda row: order.index(row["log"].partition(",")[0]))
 
 
 def told(column: str, row: Row) -> str:
@@ -243,6 +251,8 @@ def options() -> argparse.ArgumentParser:
     parser.add_argument("--logs", nargs="+", default=list(LOGS), metavar="NAME")
     parser.add_argument("--slam", nargs="+", default=["shunting"], metavar="NAME")
     parser.add_argument("--config", type=numbers, default={}, help="numbers by path; JSON")
+    parser.add_argument("--every", type=int, default=1, help="take one scan of so many")
+    parser.add_argument("--backwards", action="store_true", help="from the last scan to the first")
     parser.add_argument("--code", nargs="+", type=Path, default=[Path()], metavar="CHECKOUT")
     parser.add_argument("--out", type=Path, default=Path("out/real_logs"))
     return parser
@@ -257,13 +267,16 @@ def numbers(words: str) -> Any:
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command: run what is missing, print the table, write ``real_logs.csv``."""
     wanted = options().parse_args(arguments)
+    if wanted.every < 1:
+        raise InvalidValueError(f"--every must be a whole number >= 1, got {wanted.every}")
     rows = []
     for keys, job in cases(wanted):
         file = run_jobs([job], wanted.out / "runs", title=" ".join(keys.values()))[job.name]
         with np.load(file) as arrays:
             run = Run(**arrays)
-        log = Path(job.arguments["log"])
-        rows.append(keys | judged(run, LOGS[keys["log"]], wanted.data, log))
+        given = along_log.options().parse_args([job.arguments["log"], "", *job.arguments["words"]])
+        log = LOGS[keys["log"].partition(",")[0]]
+        rows.append(keys | judged(run, log, wanted.data, given))
         every = kept(wanted.out / "real_logs.csv", rows)
         text = io.StringIO()
         csv.writer(text, lineterminator="\n").writerows(

@@ -44,6 +44,8 @@ def relations_of(path: Path) -> list[tuple[float, float, Float]]:
 
 def by_time(stamps_s: Float, poses: Float) -> At:
     """The pose at a time, on the arc between two scans: of a dense log."""
+    order = np.argsort(stamps_s, kind="stable")  # of one that was taken backwards
+    stamps_s, poses = stamps_s[order], poses[order]
 
     def at(time: float) -> Float | None:
         k = bisect.bisect_left(stamps_s, time)

@@ -5,6 +5,7 @@ A revisit is a scan whose pose is near that of one from an earlier visit. The sc
 other by ICP from the motion that the poses state; how far they move is how far the poses are off.
 """
 
+import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 
@@ -28,14 +29,17 @@ ON_M = 0.05  # so near a point lies on a surface
 
 @dataclass(frozen=True, kw_only=True)
 class Revisits:
-    """``count`` of those whose scans tell, ``apart_cm`` (median; None without one) by ICP."""
+    """``count`` scans of a place seen before; ``apart_cm`` their median by ICP, None without one.
+
+    Scans that no motion lays on each other count as infinitely far apart.
+    """
 
     count: int
     apart_cm: float | None
 
 
 def pairs_of(seconds: Float, poses: Float, carried: int | None) -> list[tuple[int, int]]:
-    """Scans, each with the nearest one of an earlier visit; at most ``MOST_PAIRS``, evenly.
+    """Scans, each with the nearest one of an earlier visit.
 
     carried  scan before which all earlier visits are, and from which on all later ones
     """
@@ -44,14 +48,14 @@ def pairs_of(seconds: Float, poses: Float, carried: int | None) -> list[tuple[in
     for b, near in enumerate(tree.query_ball_point(poses[:, :2], NEAR_M)):
         a = np.array(near)
         turned = np.abs(se2.wrap_array(poses[a, 2] - poses[b, 2]))
-        away = (seconds[b] - seconds[a] > LATER_S) & (way[b] - way[a] > AWAY_M)
+        away = (np.abs(seconds[b] - seconds[a]) > LATER_S) & (way[b] - way[a] > AWAY_M)
         if carried is not None:
             away = (a < carried) & (b >= carried)
         a = a[away & (turned < NEAR_RAD)]
         if len(a):
             off = np.hypot(*(poses[a, :2] - poses[b, :2]).T)
             found.append((int(a[off.argmin()]), b))
-    return found[:: max(1, -(-len(found) // MOST_PAIRS))]
+    return found
 
 
 def aligned(old: Float, new: Float, T_old_new: Float) -> Float | None:
@@ -81,11 +85,10 @@ def judged(
     frames: Sequence[Frame], seconds: Float, poses: Float, carried: int | None = None
 ) -> Revisits:
     """By poses (n, 3) of frames with a scan each; ``carried`` as in ``pairs_of``."""
-    found = []
-    for a, b in pairs_of(seconds, poses, carried):
+    pairs, found = pairs_of(seconds, poses, carried), []
+    for a, b in pairs[:: max(1, -(-len(pairs) // MOST_PAIRS))]:
         stated = se2.between(poses[a], poses[b])
         old, new = deskewed(frames[a]), deskewed(frames[b])
         seen = aligned(old, new, stated) if min(len(old), len(new)) > 10 else None
-        if seen is not None:
-            found.append(float(np.hypot(*(seen - stated)[:2])))
-    return Revisits(count=len(found), apart_cm=100.0 * float(np.median(found)) if found else None)
+        found.append(math.inf if seen is None else math.hypot(*(seen - stated)[:2]))
+    return Revisits(count=len(pairs), apart_cm=100.0 * float(np.median(found)) if found else None)
