@@ -6,68 +6,28 @@ is kept in ``--out`` and not run again until that code, the log or the numbers a
 """
 
 import argparse
-import ast
 import csv
 import io
 import json
 import lzma
-import math
 import subprocess
 import sys
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, replace
 from itertools import product
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 
 from scripts.console import ended
-from scripts.experiments import along_log, relations, revisits
-from scripts.experiments.judging import (
-    Run,
-    beyond_odometry,
-    errors,
-    found,
-    found_at,
-    head_of,
-    large,
-    nees,
-    truth_of,
-)
+from scripts.experiments import along_log
+from scripts.experiments.judging import Log, Row, Run, judged
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
-from scripts.marks import table
+from scripts.marks import fill_page, table
 from scripts.names import file_name
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.files import write_bytes, write_text
-from slam.frames import Float
 from slam.shaped import one_of
-
-Row = dict[str, Any]
-HAZARD_M, JUMP_M = 1.0, 0.5  # trusted and farther off; a step is a jump
-FIRST = 40  # scans of which the time is not counted
-LEAST_REVISITS, SAME_CM = 3, 20.0  # of scans after a carrying and before: the robot is found
-
-
-@dataclass(frozen=True, kw_only=True)
-class Log:
-    """One log and what is known of it.
-
-    relations  file, and its clock less the log's, s; ``dense``: scans are near enough in time
-    carried    the first scan after the robot was carried
-    truth      TUM file of true poses; else the reference is what the log holds, if anything
-    laser      pose on the robot, where the log does not say it; ``scan``: topic, of several
-    """
-
-    file: str
-    relations: tuple[str, float] | None = None
-    dense: bool = False
-    carried: int | None = None
-    truth: str | None = None
-    laser: tuple[float, float, float] | None = None
-    scan: str | None = None
-
 
 LOGS: Mapping[str, Log] = {
     "freiburg-079": Log(file="freiburg_079/freiburg-079-corrected.log.xz", dense=True,
@@ -97,7 +57,7 @@ COLUMNS: Mapping[str, str] = {  # and how its numbers are written
     "jump_m": ".2f", "jumps": "d", "found_s": ".1f", "revisits": "d", "revisits_cm": ".1f",
     "nees": ".1f", "p50_ms": ".2f", "p999_ms": ".1f",
 }  # fmt: skip
-KEYS = ("log", "code", "slam")
+KEYS, CSV = ("log", "code", "slam"), "real_logs.csv"
 
 
 def along(path: Path, *, code: str, log: str, words: Sequence[str]) -> None:
@@ -117,67 +77,6 @@ def unpacked(file: Path, folder: Path) -> Path:
     if not out.exists():
         write_bytes(out, lzma.decompress(file.read_bytes()))
     return out
-
-
-def against(run: Run, reference: Float, log: Log) -> Row:
-    """The columns of a log with a reference."""
-    known = np.isfinite(reference).all(axis=1)
-    truth = reference[known]
-    row: Row = {}
-    for name, poses in (("online_m", run.online), ("final_m", run.final)):
-        squares = errors(poses[known], truth, slice(None))[:, :2] ** 2
-        row[name] = math.sqrt(float(squares.sum(axis=1).mean()))
-    off = errors(run.online[known], truth, head_of(truth, log.carried))
-    far = np.hypot(off[:, 0], off[:, 1]) > HAZARD_M
-    row["hazard"] = float((run.converged[known] & far).mean())
-    if log.carried is not None:
-        row["found_s"] = found(run, found_at(large(off), log.carried), log.carried)["found_s"]
-    if log.truth is not None:
-        row["nees"] = nees(run.online[known], run.covariance[known], truth)
-    return row
-
-
-def by_itself(run: Run, log: Log, given: argparse.Namespace) -> Row:
-    """The columns of a log without a reference: by its own scans where the robot is back."""
-    frames = list(along_log.frames_of(given))
-    told = revisits.judged(frames, run.seconds, run.final, log.carried)
-    row: Row = {"revisits": told.count, "revisits_cm": told.apart_cm}
-    if log.carried is not None:
-        sure = told.count >= LEAST_REVISITS and (told.apart_cm or 0.0) < SAME_CM
-        wrong = np.append(large(beyond_odometry(run)), not sure)  # until the last jump, or always
-        row |= found(run, found_at(wrong, log.carried), log.carried)
-    return row
-
-
-def by_relations(run: Run, log: Log, data: Path) -> Row:
-    """Their columns; none for a log without."""
-    if log.relations is None:
-        return {}
-    known, row = relations.relations_of(data / log.relations[0]), {}
-    lines = [] if log.dense else relations.lines_of(data / log.file)
-    for which, poses in (("online", run.online), ("final", run.final)):
-        dense = relations.by_time(run.seconds, poses)
-        at = dense if log.dense else relations.by_odometry(lines, run.reference, poses)
-        row[f"relations_{which}_m"] = relations.error_m(known, log.relations[1], at)
-    return row
-
-
-def judged(run: Run, log: Log, data: Path, given: argparse.Namespace) -> Row:
-    """All columns of a run; ``given``: the options of ``along_log``."""
-    if log.carried is not None:
-        carried = -(-log.carried // given.every)
-        log = replace(log, carried=len(run.online) - carried if given.backwards else carried)
-    reference = run.reference if log.truth is None else truth_of(data / log.truth, run.seconds)
-    referred = bool(np.isfinite(reference).any())
-    row = against(run, reference, log) if referred else by_itself(run, log, given)
-    row |= {"scans": len(run.online), "trusted": float(run.converged.mean())}
-    if np.isfinite(run.odometry).all():
-        jumps = np.hypot(*beyond_odometry(run)[:, :2].T)
-        row |= {"jump_m": float(jumps.max()), "jumps": int((jumps > JUMP_M).sum())}
-    spent = run.spent_ms[FIRST:][np.isfinite(run.spent_ms[FIRST:])]
-    if len(spent):
-        row |= {"p50_ms": float(np.median(spent)), "p999_ms": float(np.quantile(spent, 0.999))}
-    return row | by_relations(run, log, data)
 
 
 def commit_of(code: Path) -> str:
@@ -238,10 +137,29 @@ def kept(path: Path, rows: Sequence[Row]) -> list[Row]:
     return sorted(every.values(), key=lambda row: order.index(row["log"].partition(",")[0]))
 
 
+def as_csv(rows: Sequence[Row]) -> str:
+    """The table as text."""
+    text = io.StringIO()
+    csv.writer(text, lineterminator="\n").writerows([list(COLUMNS), *(r.values() for r in rows)])
+    return text.getvalue()
+
+
 def told(column: str, row: Row) -> str:
     """A cell; "" for what cannot be said of that log."""
     value = row.get(column)
     return "" if value is None else format(value, COLUMNS[column])
+
+
+def summary(rows: Sequence[Row]) -> str:
+    """A table of the cells of all columns: a line a log, a column a SLAM."""
+    slams = dict.fromkeys((row["code"], row["slam"]) for row in rows)
+    lines: dict[str, dict[tuple[str, str], str]] = {}
+    for row in rows:
+        error = row["online_m"] or f"{row['revisits_cm'] or 'none '}cm"
+        words = [error, row["trusted"], *([f"{row['found_s']}s"] if row["found_s"] else [])]
+        lines.setdefault(row["log"], {})[row["code"], row["slam"]] = "/".join(words)
+    cells = [[log, *(line.get(slam, "") for slam in slams)] for log, line in lines.items()]
+    return table(["log", *(" ".join(slam) for slam in slams)], cells)
 
 
 def options() -> argparse.ArgumentParser:
@@ -250,17 +168,13 @@ def options() -> argparse.ArgumentParser:
     parser.add_argument("--data", type=Path, required=True, help="folder with the folders of logs")
     parser.add_argument("--logs", nargs="+", default=list(LOGS), metavar="NAME")
     parser.add_argument("--slam", nargs="+", default=["shunting"], metavar="NAME")
-    parser.add_argument("--config", type=numbers, default={}, help="numbers by path; JSON")
+    parser.add_argument("--config", type=json.loads, default={}, help="numbers by path, JSON")
     parser.add_argument("--every", type=int, default=1, help="take one scan of so many")
     parser.add_argument("--backwards", action="store_true", help="from the last scan to the first")
     parser.add_argument("--code", nargs="+", type=Path, default=[Path()], metavar="CHECKOUT")
     parser.add_argument("--out", type=Path, default=Path("out/real_logs"))
+    parser.add_argument("--page", type=Path, help="fill its marked place with all rows so far")
     return parser
-
-
-def numbers(words: str) -> Any:
-    """JSON, or a literal of Python."""
-    return ast.literal_eval(words)
 
 
 @ended
@@ -269,7 +183,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     wanted = options().parse_args(arguments)
     if wanted.every < 1:
         raise InvalidValueError(f"--every must be a whole number >= 1, got {wanted.every}")
-    rows = []
+    rows: list[Row] = []
     for keys, job in cases(wanted):
         file = run_jobs([job], wanted.out / "runs", title=" ".join(keys.values()))[job.name]
         with np.load(file) as arrays:
@@ -277,15 +191,14 @@ def main(arguments: Sequence[str] | None = None) -> None:
         given = along_log.options().parse_args([job.arguments["log"], "", *job.arguments["words"]])
         log = LOGS[keys["log"].partition(",")[0]]
         rows.append(keys | judged(run, log, wanted.data, given))
-        every = kept(wanted.out / "real_logs.csv", rows)
-        text = io.StringIO()
-        csv.writer(text, lineterminator="\n").writerows(
-            [list(COLUMNS), *(r.values() for r in every)]
-        )
-        write_text(wanted.out / "real_logs.csv", text.getvalue())
+        write_text(wanted.out / CSV, as_csv(kept(wanted.out / CSV, rows)))
     print(table(list(COLUMNS), [[told(key, row) for key in COLUMNS] for row in rows], left=3))
-    on = machine()
-    print(f"\nMachine: {on['processor']}, {on['cores']} cores, Python {on['python']}.")
+    on = f"Measured on: {machine()['processor']}, {machine()['cores']} cores."
+    print(f"\n{on}")
+    if wanted.page:
+        every = kept(wanted.out / CSV, rows)
+        whole = table(list(COLUMNS), [list(row.values()) for row in every], left=3)
+        fill_page(wanted.page, "real_logs", f"{summary(every)}\n\n{on}\n\n{whole}", most=90)
 
 
 if __name__ == "__main__":
