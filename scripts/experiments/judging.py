@@ -13,6 +13,7 @@ from numpy.typing import NDArray
 
 from scripts.experiments import along_log, relations, revisits
 from slam import se2
+from slam.evaluation.consistency import KeptScans
 from slam.frames import Float
 
 Row = dict[str, Any]
@@ -149,7 +150,12 @@ def by_itself(run: Run, log: Log, given: argparse.Namespace) -> Row:
     """The columns of a log without a reference: by its own scans where the robot is back."""
     frames = list(along_log.frames_of(given))
     told = revisits.judged(frames, run.seconds, run.final, log.carried)
+    kept = KeptScans()
+    for frame in frames:
+        kept.note(frame, frame.odometry.T_odom_robot)  # the same scans for every SLAM
+    sharp = kept.judged(run.final)
     row: Row = {"revisits": told.count, "revisits_cm": told.apart_cm}
+    row["sharp_nats"] = None if sharp is None else sharp.sharper_nats
     if log.carried is not None:
         sure = told.count >= LEAST_REVISITS and (told.apart_cm or 0.0) < SAME_CM
         wrong = np.append(large(beyond_odometry(run)), not sure)  # until the last jump, or always

@@ -12,15 +12,17 @@ import json
 import lzma
 import subprocess
 import sys
-from collections.abc import Mapping, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from itertools import product
 from pathlib import Path
+from statistics import fmean
 
 import numpy as np
 
 from scripts.console import ended
 from scripts.experiments import along_log
 from scripts.experiments.judging import Log, Row, Run, judged
+from scripts.experiments.study import geometric
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
 from scripts.marks import fill_page, table
@@ -55,7 +57,13 @@ COLUMNS: Mapping[str, str] = {  # and how its numbers are written
     "log": "", "code": "", "slam": "", "scans": "d", "online_m": ".3f", "final_m": ".3f",
     "relations_online_m": ".4f", "relations_final_m": ".4f", "trusted": ".3f", "hazard": ".3f",
     "jump_m": ".2f", "jumps": "d", "found_s": ".1f", "revisits": "d", "revisits_cm": ".1f",
-    "nees": ".1f", "p50_ms": ".2f", "p999_ms": ".1f",
+    "sharp_nats": ".3f",    "nees": ".1f", "p50_ms": ".2f", "p999_ms": ".1f",
+}  # fmt: skip
+SUMS: Mapping[str, tuple[str, Callable[[Sequence[float]], float]]] = {  # of the logs of a SLAM
+    "online, m": ("online_m", geometric), "worst": ("online_m", max),
+    "trusted": ("trusted", fmean), "least": ("trusted", min), "hazard, worst": ("hazard", max),
+    "jumps": ("jumps", sum), "found, s": ("found_s", max), "revisits, cm": ("revisits_cm", max),
+    "p99.9, ms": ("p999_ms", max),
 }  # fmt: skip
 KEYS, CSV = ("log", "code", "slam"), "real_logs.csv"
 
@@ -130,7 +138,7 @@ def kept(path: Path, rows: Sequence[Row]) -> list[Row]:
     old: list[Row] = []
     if path.exists():
         with path.open(newline="", encoding="utf-8") as file:
-            old = list(csv.DictReader(file))
+            old = [{key: row.get(key, "") for key in COLUMNS} for row in csv.DictReader(file)]
     new = [{key: told(key, row) for key in COLUMNS} for row in rows]
     every = {tuple(row[key] for key in KEYS): row for row in (*old, *new)}
     order = list(LOGS)
@@ -151,15 +159,16 @@ def told(column: str, row: Row) -> str:
 
 
 def summary(rows: Sequence[Row]) -> str:
-    """A table of the cells of all columns: a line a log, a column a SLAM."""
-    slams = dict.fromkeys((row["code"], row["slam"]) for row in rows)
-    lines: dict[str, dict[tuple[str, str], str]] = {}
+    """A table of the cells of all columns: a line a SLAM, over its logs."""
+    slams: dict[tuple[str, str], list[Row]] = {}
     for row in rows:
-        error = row["online_m"] or f"{row['revisits_cm'] or 'none '}cm"
-        words = [error, row["trusted"], *([f"{row['found_s']}s"] if row["found_s"] else [])]
-        lines.setdefault(row["log"], {})[row["code"], row["slam"]] = "/".join(words)
-    cells = [[log, *(line.get(slam, "") for slam in slams)] for log, line in lines.items()]
-    return table(["log", *(" ".join(slam) for slam in slams)], cells)
+        slams.setdefault((row["code"], row["slam"]), []).append(row)
+    lines = []
+    for slam, own in slams.items():
+        numbers = {key: [float(row[key]) for row in own if row[key]] for key, _ in SUMS.values()}
+        cells = [f"{how(v):.3g}" if (v := numbers[key]) else "–" for key, how in SUMS.values()]
+        lines.append([*slam, str(len(own)), *cells])
+    return table(["code", "slam", "logs", *SUMS], lines, left=2)
 
 
 def options() -> argparse.ArgumentParser:
@@ -198,7 +207,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     if wanted.page:
         every = kept(wanted.out / CSV, rows)
         whole = table(list(COLUMNS), [list(row.values()) for row in every], left=3)
-        fill_page(wanted.page, "real_logs", f"{summary(every)}\n\n{on}\n\n{whole}", most=90)
+        fill_page(wanted.page, "real_logs", f"{summary(every)}\n\n{on}\n\n{whole}")
 
 
 if __name__ == "__main__":

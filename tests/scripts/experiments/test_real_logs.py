@@ -78,7 +78,20 @@ def test_a_log_is_run_in_its_checkout_and_judged(
     assert 0.1 < float(row["relations_online_m"]) < 0.4  # 0.9 of 2.6 m
     assert (back["log"], back["scans"]) == ("a, every 2, backwards", "25")
     assert float(back["online_m"]) == pytest.approx(float(row["online_m"]), abs=0.05)
-    assert f"| a | {row['online_m']}/1.000 |" in page.read_text()
+    assert "| odometry | 2 | " in page.read_text()
+
+
+def test_logs_of_a_slam_are_summed_up():
+    rows = [
+        dict.fromkeys(real_logs.COLUMNS, "") | {"code": "c", "slam": "s", **row}
+        for row in (
+            {"log": "a", "online_m": "0.1", "trusted": "0.5", "jumps": "2"},
+            {"log": "b", "online_m": "0.4", "trusted": "1.0", "jumps": "1"},
+            {"log": "c", "trusted": "0.9", "found_s": "inf", "revisits_cm": "3"},
+        )
+    ]
+    line = real_logs.summary(rows).splitlines()[-1]
+    assert line == "| c | s | 3 | 0.2 | 0.4 | 0.8 | 0.5 | – | 3 | inf | 3 | – |"
 
 
 def test_what_is_no_checkout_is_told(tmp_path: Path, capsys: pytest.CaptureFixture):
