@@ -60,10 +60,10 @@ COLUMNS: Mapping[str, str] = {  # and how its numbers are written
     "sharp_nats": ".3f",    "nees": ".1f", "p50_ms": ".2f", "p999_ms": ".1f",
 }  # fmt: skip
 SUMS: Mapping[str, tuple[str, Callable[[Sequence[float]], float]]] = {  # of the logs of a SLAM
-    "online, m": ("online_m", geometric), "worst": ("online_m", max),
-    "trusted": ("trusted", fmean), "least": ("trusted", min), "hazard, worst": ("hazard", max),
-    "jumps": ("jumps", sum), "found, s": ("found_s", max), "revisits, cm": ("revisits_cm", max),
-    "p99.9, ms": ("p999_ms", max),
+    "online_m": ("online_m", geometric), "worst": ("online_m", max),
+    "trusted": ("trusted", fmean), "least": ("trusted", min), "hazard": ("hazard", max),
+    "jumps": ("jumps", sum), "found_s": ("found_s", max), "revisits_cm": ("revisits_cm", max),
+    "p999_ms": ("p999_ms", max),
 }  # fmt: skip
 KEYS, CSV = ("log", "code", "slam"), "real_logs.csv"
 
