@@ -156,13 +156,12 @@ def frames_of(log: Log, file: Path, data: Path) -> list[Frame]:
         epoch_ns = int(stream.metadata.extra.get(EPOCH, 0))
         stamps_ns = np.array([frame.stamp_ns for frame in frames]) + epoch_ns
         truths = truth_of(data / log.truth, seconds(stamps_ns))
-        frames = [replace(frame, truth=at) for frame, at in zip(frames, truths, strict=True)]
+        pairs = zip(frames, truths, strict=True)
+        frames = [replace(frame, truth=at) for frame, at in pairs if np.isfinite(at).all()]
     if log.carried is not None:
         frames = max(frames[: log.carried], frames[log.carried :], key=len)
-    known = [
-        frame for frame in frames if frame.truth is not None and np.isfinite(frame.truth).all()
-    ]
-    return known or [frame.without_truth() for frame in frames]
+    known = [frame for frame in frames if frame.truth is not None]
+    return known or frames
 
 
 def sampled(path: Path, *, log: dict[str, Any], file: str, data: str, scans: int) -> None:

@@ -175,7 +175,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     text = told({name: [tuple(one) for one in own] for name, own in logs.items()})
     print(text)
     if wanted.page:
-        fill_page(wanted.page, "fit", text, most=60)
+        fill_page(wanted.page, "fit", text)
 
 
 if __name__ == "__main__":
