@@ -38,6 +38,7 @@ CARRIED_M, CARRIED_RAD = 3.0, 0.5 * math.pi  # where another scan was seen, off 
 STEP_M, STEP_RAD = 0.1, 0.1  # a pose is right after a step that the reference confirms to both
 FIRST_SHARE = 0.1  # of a log, before a scan is asked
 UNBOUNDED = 1e6  # times the time of a scan, for a search
+ENOUGH = 100  # scans before the robot is carried: else those after it are taken
 LEAST = 1e-3  # share: numerical guard
 PLACE, GOES_ON = "place", "goes on"
 Sample = tuple[str, float, bool]
@@ -75,19 +76,19 @@ class Drive:
         self._truths: list[Float] = []
         self._seen: list[tuple[Float, Observations]] = []  # by the reference
         self._new: list[Sample] = []
+        self._led = np.zeros(3)  # the pose before by the reference, or by odometry
 
     def take(self, frame: Frame) -> None:
         """The next scan of the log."""
-        truth = frame.odometry.T_odom_robot if frame.truth is None else frame.truth
+        led = frame.odometry.T_odom_robot if frame.truth is None else frame.truth
         self._slam.ask = None
         if frame.stamp_ns in self._stamps and self._poses:
             self._slam.ask = lambda *of: self._ask(frame, *of)
         pose = self._slam.update(frame.without_truth()).T_map_robot
-        step = se2.between(self._poses[-1], pose) if self._poses else pose
-        wanted = se2.between(self._truths[-1], truth) if self._truths else truth
-        if not far(step, wanted, STEP_M, STEP_RAD):
-            self.samples += self._new
-        self._new = []
+        if self._poses:
+            step, wanted = se2.between(self._poses[-1], pose), se2.between(self._led, led)
+            self.samples += [] if far(step, wanted, STEP_M, STEP_RAD) else self._new
+        self._new, self._led = [], led
         self._poses.append(pose)
         self._truths.append(pose if frame.truth is None else frame.truth)
 
@@ -159,7 +160,8 @@ def frames_of(log: Log, file: Path, data: Path) -> list[Frame]:
         pairs = zip(frames, truths, strict=True)
         frames = [replace(frame, truth=at) for frame, at in pairs if np.isfinite(at).all()]
     if log.carried is not None:
-        frames = max(frames[: log.carried], frames[log.carried :], key=len)
+        first = log.carried >= ENOUGH
+        frames = frames[: log.carried] if first else frames[log.carried :]
     known = [frame for frame in frames if frame.truth is not None]
     return known or frames
 

@@ -8,7 +8,6 @@ and wrong weigh alike, and so do logs.
 
 import argparse
 import json
-import math
 import sys
 from collections.abc import Sequence
 from dataclasses import asdict
@@ -87,10 +86,8 @@ def judged(log: str, kind: str, samples: Samples, p: Array) -> list[str]:
         own &= samples.log == log
     right, weight, sure = samples.right[own], samples.weight[own], p[own] > SURE
     told = np.where(right, p[own], 1.0 - p[own])
-    loss = -float(np.average(np.log(told), weights=weight)) if own.any() else math.nan
-    share = float(np.average(right[sure], weights=weight[sure])) if sure.any() else math.nan
-    counts = [int(right.sum()), int((~right).sum())]
-    return [log, kind, *map(str, counts), f"{loss:.3f}", str(int(sure.sum())), f"{share:.4f}"]
+    loss, share = mean(-np.log(told), weight), mean(right[sure].astype(np.float64), weight[sure])
+    return [log, kind, *map(str, (right.sum(), (~right).sum())), loss, str(sure.sum()), share]
 
 
 def reliability(samples: Samples, p: Array) -> str:
@@ -109,7 +106,7 @@ def reliability(samples: Samples, p: Array) -> str:
 
 def mean(values: Array, weights: Array) -> str:
     """Weighted; a dash of none."""
-    return f"{float(np.average(values, weights=weights)):.3f}" if len(values) else "–"
+    return f"{float(np.average(values, weights=weights)):.4f}" if len(values) else "–"
 
 
 def left_out(samples: Samples) -> tuple[Array, Array]:
