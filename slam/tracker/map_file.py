@@ -51,7 +51,7 @@ _NUMBERS: dict[str, tuple[str, ...]] = {
     "standing": (
         "alert_m", "better", "doubtful_m", "explains", "fallen", "fallen_s", "long_window_s",
         "outvoted", "rival_gain", "rival_m", "rival_points", "rival_rad", "rival_s", "rival_scans",
-        "undecided_s", "young_trace",
+        "undecided_s",
     ),
     "tracking.relocalise": (
         "alias", "alone", "denied_here", "drift_m", "drift_rad", "enough", "enough_last",

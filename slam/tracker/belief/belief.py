@@ -24,11 +24,10 @@ from slam.tracker.belief.state import State
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.local_search import SearchWindow
-from slam.tracker.matching.matcher import Match, Matcher, near, unmatched
+from slam.tracker.matching.matcher import OFTEN_S, Match, Matcher, near, unmatched
 from slam.tracker.rasterise import seen_at
 from slam.tracker.standing.agreement import Agreement
 
-OFTEN_S = 1.0  # scans that come more seldom say nothing of what moves; set by hand
 STILL = np.diag([1e8, 1e8, 1e8])  # 1/m^2, 1/rad^2: a pose that does not move
 MOST_LOST = 100.0  # nats: seven scans that go on end any doubt; set by hand
 ENOUGH = 0.5  # of the novelty of a place far away, before it is taken; set by hand

@@ -197,7 +197,7 @@ class Numbers(NamedTuple):
 def _numbers(plain: tuple[Any, ...]) -> tuple[Reward, Climb]:
     r, c = plain[0], plain[1]
     return (
-        Reward(r[0], r[1], r[2], r[3], r[4], r[5], r[6]),
+        Reward(r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]),
         Climb(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]),
     )
 

@@ -24,6 +24,7 @@ from slam.tracker.matching.config import UsualConfig
 from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import Reward, Seen
 
+OFTEN_S = 0.4  # scans that come more seldom say little of what moves; set by hand
 LEAST = 1e-9  # shares are divided by the usual one
 
 
@@ -151,6 +152,7 @@ class Matcher:
             log_floor=config.matching.log_floor,
             tail=config.matching.tail,
             tail_cells=config.matching.tail_cells,
+            young_trace=0.0,
         )
         self.numbers = config.matching
         steps, cell = self.numbers.climb, config.cell_m
@@ -164,7 +166,9 @@ class Matcher:
             (steps.moved_cells * cell) ** 2,
             (steps.widest_cells * cell) ** 2,
         )
-        self._plain = tuple(numbers)
+        closed = self.reward._replace(young_trace=config.standing.young_trace)
+        self._open, self._closed = tuple(numbers), tuple(numbers._replace(reward=tuple(closed)))
+        self._plain = self._open
         n = steps.few
         self._few = (
             np.empty((n, 2)), np.empty((n, 3)), np.empty(n), np.empty((n, 2)),
@@ -175,7 +179,18 @@ class Matcher:
         self._around = Around(self.reward.short_term)
 
     def match(self, observations: Observations, prediction: Prediction, cell_map: CellMap) -> Match:
-        """Climb from the prediction; search around it when that is vague or finds too little."""
+        """Climb from the prediction; search around it when that is vague or finds too little.
+
+        While scans come often, faint traces are closed to returns without weight.
+        """
+        self._plain = self._closed if prediction.elapsed <= OFTEN_S else self._open
+        found = self._searched(observations, prediction, cell_map)
+        self._plain = self._open
+        return found
+
+    def _searched(
+        self, observations: Observations, prediction: Prediction, cell_map: CellMap
+    ) -> Match:
         predicted, prior = prediction.T_map_robot, prediction.prior
         match = self.matched(cell_map, observations, predicted, prior)
         local = self.numbers.local

@@ -18,7 +18,7 @@ from slam.tracker.cells import MASK, SHIFT, Cells
 
 
 class Reward(NamedTuple):
-    """How overlaps are rewarded; four as in ``MatchingConfig``.
+    """How overlaps are rewarded; four as in ``MatchingConfig``, the last as in ``StandingConfig``.
 
     cell        m
     short_term  weight of x in v = y + (1 - y) * short_term * x
@@ -32,6 +32,7 @@ class Reward(NamedTuple):
     log_floor: float
     tail: float
     tail_cells: float
+    young_trace: float
 
 
 class Seen(NamedTuple):
@@ -91,9 +92,10 @@ def _bell(a: float, b: float, d: float, tail: float, tail_cells: float) -> Bell:
 
 
 @inlined
-def _overlap(  # noqa: C901, PLR0915 (kernel)
+def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
     field: Field,
     short_term: float,
+    closed: float,
     u: float,
     v: float,
     bell: Bell,
@@ -104,7 +106,7 @@ def _overlap(  # noqa: C901, PLR0915 (kernel)
     (u, v) and ``bell`` are in cells, cell (i, j) lies at (i, j). f is the sum over
     cells of Gaussian times activity, divided so that a lone landmark scores 1 on itself. Cells
     of a surface that faces away from the observed one (``faced``) do not count. ``short_term``:
-    weight of x.
+    weight of x; ``closed`` of a faint trace y: y (1 - closed (1 - y)).
     Returns f, df/du, df/dv, -d2f/du2, -d2f/dudv, -d2f/dv2.
     """
     d, pa, pb, pd, wide, high, lean, falling, slowing, norm = bell
@@ -148,6 +150,7 @@ def _overlap(  # noqa: C901, PLR0915 (kernel)
                 while i < end:
                     x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
                     value = y + (1.0 - y) * short_term * x
+                    value -= closed * y * (1.0 - y)
                     if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
                         value = 0.0
                     value *= kernel
@@ -255,8 +258,9 @@ def evaluated(  # noqa: PLR0913, PLR0915 (kernel)
             alike, bell = (a, b, d), _bell(a, b, d, reward.tail, reward.tail_cells)
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
         vote = seen.votes[k]
+        closed = reward.young_trace * (1.0 - vote)
         faced = turned_face(seen.facings[k], pose[2])
-        f, gx, gy, a, b, d = _overlap(field, reward.short_term * vote, u, v, bell, faced)
+        f, gx, gy, a, b, d = _overlap(field, reward.short_term * vote, closed, u, v, bell, faced)
         if f > reward.matched_overlap:
             matched += seen.weights[k]
         else:

@@ -16,6 +16,10 @@ class StandingConfig(Settings):
         5.0, "s", "a return whose place was seen empty so long ago has half its weight; 0: off",
         SEEDS,
     )  # fmt: skip
+    young_trace: float = number(
+        1.0, "share", "of a faint trace (1 - y), closed to returns without weight while scans come "
+        "often", SEEDS, high=1.0,
+    )  # fmt: skip
     views: int = number(5, "scans", "earlier scans that are asked", SEEDS, low=1, high=64)
     spacing_s: float = number(
         0.2, "s", "least time between two kept scans; age of the second one asked", SEEDS, low=1e-3
