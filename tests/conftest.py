@@ -51,7 +51,6 @@ MARKS: dict[str, tuple[str, ...]] = {
         "scripts/debugger/",
         "scripts/experiments/",
         "scripts/integrity/test_campaign.py",
-        "scripts/integrity/test_fit.py",
         "scripts/log_twin/",
         "scripts/paper/test_reproduce.py",
         "scripts/paper/test_runs.py",

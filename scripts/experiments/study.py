@@ -40,7 +40,6 @@ from scripts.names import file_name
 from scripts.result_files import RESULTS, SCHEMA, commit, write
 from sim.core.versions import WORLD
 from sim.recording.recipe import Recipe
-from slam.errors import InvalidValueError
 from slam.replay import Track
 from slam.system import create
 
@@ -154,7 +153,6 @@ class Study:
              is a value of each axis, ``seed`` and ``seconds``. A function of a module
     drive    of a case: what is simulated and kept, a recipe and one scan in ``every``; None:
              ``run`` makes what it needs
-    data     of a case: files that ``run`` reads; with another content it is made again
     fits     whether a case is run at all
     lines    axes of which each combination is a line of the table; the rest is pooled
     columns  heading -> cell, of the rows of a line
@@ -168,7 +166,6 @@ class Study:
     axes: Mapping[str, Sequence[Any]]
     run: Callable[..., Row]
     drive: Callable[[Row], Row | None] = lambda case: None
-    data: Callable[[Row], Sequence[Path]] = lambda case: ()
     fits: Callable[[Row], bool] = lambda case: True
     lines: Sequence[str] = ()
     columns: Mapping[str, Column] = field(default_factory=dict)
@@ -211,12 +208,10 @@ class Study:
     def cases(self, wanted: argparse.Namespace) -> list[Row]:
         """Of every value of each axis and every seed, those that fit."""
         values = [getattr(wanted, axis) for axis in self.axes]
-        cases = [
+        cases = (
             {**dict(zip(self.axes, of, strict=True)), "seed": seed, "seconds": wanted.seconds}
             for *of, seed in product(*values, seeds_of(wanted))
-        ]
-        if any(case.get("every", 1) < 1 for case in cases):
-            raise InvalidValueError(f"--every must be a whole number >= 1, got {wanted.every}")
+        )
         return [case for case in cases if self.fits(case)]
 
     def rows(self, cases: Sequence[Row], folder: Path, jobs: int) -> list[Row]:
@@ -238,7 +233,7 @@ class Study:
             call=cell,
             arguments={"call": call, "case": case, **more},
             suffix=".json",
-            code=(*sources(slam, sim, scenes), *_scripts(module), *self.data(case)),
+            code=(*sources(slam, sim, scenes), *_scripts(module)),
         )
 
     def markdown(self, rows: Sequence[Row]) -> str:

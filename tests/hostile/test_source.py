@@ -47,6 +47,7 @@ STARTERS = {
     "scripts/benches/shares.py": "perf and nm, on ourselves",
     "scripts/benches/sides.py": "the Python of each of two checkouts",
     "scripts/film/encode.py": "ffmpeg",
+    "scripts/experiments/real_logs.py": "our own Python in each checkout, and git",
     "scripts/result_files.py": "git, for the commit of a results file",
 }
 

@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from slam.settings import Settings, number
 
-FITTED = "scripts.integrity.fit (docs/belief.md)"
+BY_HAND = "by hand: scripts.experiments.fit_belief gives others (docs/belief.md)"
 RIGHT = "never reached at right poses of real logs (docs/belief.md)"
 
 
@@ -14,12 +14,12 @@ class BeliefConfig(Settings):
     """What a scan says of where the robot is, in nats: docs/belief.md."""
 
     slope: float = number(
-        3.3, "nats", "a: of a share s of the returns that are explained, a logit(s)", FITTED
+        3.3, "nats", "a: of a share s of the returns that are explained, a logit(s)", BY_HAND
     )
     known: float = number(
-        2.0, "nats", "b: added for where motion led, s being the share of the second before", FITTED
+        2.0, "nats", "b: added for where motion led, s being the share of the second before", BY_HAND
     )
-    new: float = number(4.0, "nats", "less than that for a place that is found", FITTED)
+    new: float = number(4.0, "nats", "less than that for a place that is found", BY_HAND)
     best: float = number(
         1.6, "nats", "less for one found in the whole map: the best of all is better than any one"
     )

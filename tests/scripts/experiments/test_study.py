@@ -15,7 +15,7 @@ from sim.simulation import Simulation, tour
 from slam.errors import UnknownNameError
 from slam.system import create
 
-NAMES = ("ablation", "logs")
+NAMES = ("ablation",)
 STUDIES = {name: importlib.import_module(f"scripts.experiments.{name}").STUDY for name in NAMES}
 
 
@@ -74,8 +74,6 @@ def test_a_drive_of_a_track_is_that_of_its_level():
 
 def test_what_cannot_be_run_is_told_in_a_line(tmp_path: Path, capsys):
     more = ["--folder", str(tmp_path / "a"), "--results", str(tmp_path / "r.json"), "--no-page"]
-    assert STUDIES["logs"].main(["--every", "0", *more]) == 1
-    assert capsys.readouterr().err.startswith("--every must be a whole number >= 1, got")
     for words, says in (("--level 7", "the level of a track"), ("--track rush-our", "no track")):
         assert STUDIES["ablation"].main([*words.split(), *more]) == 1
         assert capsys.readouterr().err.startswith(says)
