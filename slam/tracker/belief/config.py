@@ -5,7 +5,7 @@ from dataclasses import dataclass
 
 from slam.settings import Settings, number
 
-BY_HAND = "by hand: scripts.experiments.fit_belief gives others (docs/belief.md)"
+NOT_FIT = "by hand: scripts.experiments.fit_belief gives others (docs/belief.md)"
 RIGHT = "never reached at right poses of real logs (docs/belief.md)"
 
 
@@ -14,12 +14,15 @@ class BeliefConfig(Settings):
     """What a scan says of where the robot is, in nats: docs/belief.md."""
 
     slope: float = number(
-        3.3, "nats", "a: of a share s of the returns that are explained, a logit(s)", BY_HAND
+        3.3, "nats", "a: of a share s of the returns that are explained, a logit(s)", NOT_FIT
     )
     known: float = number(
-        2.0, "nats", "b: added for where motion led, s being the share of the second before", BY_HAND
+        2.0,
+        "nats",
+        "b: added for where motion led, s being the share of the second before",
+        NOT_FIT,
     )
-    new: float = number(4.0, "nats", "less than that for a place that is found", BY_HAND)
+    new: float = number(4.0, "nats", "less than that for a place that is found", NOT_FIT)
     best: float = number(
         1.6, "nats", "less for one found in the whole map: the best of all is better than any one"
     )
