@@ -93,3 +93,12 @@ def test_what_was_not_in_view_before_need_not_go_on() -> None:
 def test_nothing_before_is_no_division_by_nothing() -> None:
     assert np.isfinite(Usual(CONFIG).share(match(), ALL))
     assert Usual(CONFIG).share(match(overlapped=0.0), ALL) == 0.0
+
+
+def test_the_first_scan_in_a_loaded_map_is_to_go_on_from_it() -> None:
+    usual = Usual(CONFIG)
+    usual.know([])  # of an empty one
+    assert usual.share(match(), ALL) > 1.0
+    usual.know([0.7, 0.8, 0.8])
+    assert usual.share(match(overlapped=0.8), ALL) == pytest.approx(1.0)
+    assert usual.share(match(overlapped=0.1), ALL) == pytest.approx(0.125)
