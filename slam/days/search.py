@@ -254,8 +254,8 @@ class StartSearch:
             for one in now:
                 at = se2.compose(late.T_map_own, one.T_own_robot)
                 match = self._known.matched(one.observations, at, covariance)
-                nats = KEPT_ANEW * self._places.told(match)
-                late.place = replace(late.place, nats=late.place.nats + nats)
+                told = late.place.told + KEPT_ANEW * self._places.told(match)
+                late.place = replace(late.place, told=told, anew=late.place.anew + KEPT_ANEW)
             if not late.unasked:
                 self._late.pop(0)
                 self._weigh(late, pose)

@@ -97,7 +97,10 @@ class Belief:
         config, doubt = self._matcher.config, self._doubt
         self.busy = 0.0 if doubt is None else 1.0
         per_h = config.carried_per_h
-        self._unknown = sum_of([self._unknown, carried(per_h, prediction.elapsed)])
+        before = self._unknown
+        self._unknown = sum_of([before, carried(per_h, prediction.elapsed)])
+        if doubt is not None:
+            doubt.places.lag(self._unknown - before)
         if not len(observations.points_robot):
             return self._blind(cell_map, prediction)
         local = cell_map if doubt is None else doubt.local
@@ -106,12 +109,13 @@ class Belief:
             self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
             match = self._undragged(cell_map, observations, match)
         share = self._matcher.usual.share(match, observations)
-        odd = per_h > 0.0 and share < config.tracking.relocalise.goes_on
-        if doubt is None and odd:
+        least = config.tracking.relocalise.goes_on
+        odd = share < least or match.overlapped < least * self._matcher.usual.match
+        if doubt is None and odd and per_h > 0.0:
             doubt = Doubt(cell_map, self._matcher)
-        nats = self._goes_on(doubt, observations, match, share)
+        goes_on, nats = self._going_on(doubt, observations, match, share)
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_LOST)
-        if nats >= 0.0:
+        if goes_on:
             self._matcher.usual.follow(match, observations, prediction.elapsed)
         else:  # by odometry: what it was matched to says nothing
             by_odometry = unmatched(prediction.T_map_robot, matched=match.matched, score=0.0)
@@ -121,14 +125,14 @@ class Belief:
             return self._settled(cell_map, match, prediction)
         doubt = self._doubt = doubt or Doubt(cell_map, self._matcher)
         doubt.match = match
-        return self._searched(doubt, observations, prediction, nats)
+        return self._searched(doubt, observations, prediction, goes_on)
 
     def _undragged(self, cell_map: CellMap, observations: Observations, match: Match) -> Match:
         """The match, or where odometry leads: movers carry off what odometry denies, and what does
         not explain clearly more of what is long known.
         """
         config, agreement = self._matcher.config, self._agreement
-        if not 0.0 < config.standing.disagreed < agreement.denied:
+        if not 0.0 < config.standing.disagreed < agreement.denied or not agreement.is_far:
             return match
         if not observations.tangents.any():  # points: no surface tells whether odometry is right
             return match
@@ -139,22 +143,22 @@ class Belief:
         agreement.put_back()
         return replace(back, overlapped=match.overlapped)
 
-    def _goes_on(
+    def _going_on(
         self, doubt: Doubt | None, observations: Observations, match: Match, share: float
-    ) -> float:
-        """Nats of a scan for where motion led, by what goes on from the scans before.
+    ) -> tuple[bool, float]:
+        """Whether a scan goes on from those before, and its nats for where motion led.
 
         Against it no more than by what it sees through: what is hidden denies nothing.
         """
         config = self._matcher.config
         if observations.weight < config.tracking.relocalise.least_weight:
-            return 0.0
+            return True, 0.0
         nats = told(config.belief, share)
         if nats >= 0.0 or doubt is None:
-            return max(nats, 0.0)
+            return True, max(nats, 0.0)
         through_m = seen_at(doubt.cell_map, observations, match.T_map_robot).through
         most = config.belief.hidden * max(through_m - config.belief.hidden_m, 0.0)
-        return max(nats, -most)
+        return False, max(nats, -most)
 
     def _on_map(self, doubt: Doubt, everyone: Observations) -> Match:
         """What the match where motion led is on the map of before the doubt."""
@@ -187,37 +191,44 @@ class Belief:
 
     def _weigh(self, places: list[Place]) -> list[float]:
         """Probabilities of these places; of what is left, ``p_lost`` is that of not the motion."""
-        weights = [0.0, self._unknown, *(self._unknown + place.nats for place in places)]
+        found = self._unknown - self._matcher.config.belief.best
+        weights = [0.0, self._unknown, *(found + place.nats for place in places)]
         of_motion, _, *others = probabilities(weights)
         self.p_lost = max(0.0, 1.0 - of_motion)
         return others
 
     def _searched(
-        self, doubt: Doubt, observations: Observations, prediction: Prediction, nats: float
+        self, doubt: Doubt, observations: Observations, prediction: Prediction, goes_on: bool
     ) -> Judged:
         """Other places are asked, and one is taken if it is certain."""
         config, everyone = self._matcher.config, observations.with_votes(None)
         prices, frozen_above = config.matching.budget, config.belief.frozen_above
-        budget = Budget(prices, prices.lost_share if self.p_lost > 0.5 else prices.frozen_share)
+        lost = self.p_lost > 0.5 or not goes_on
+        budget = Budget(prices, prices.lost_share if lost else prices.frozen_share)
         doubt.told = doubt.places.told(self._on_map(doubt, everyone))
-        doubt.places.follow(everyone, prediction, budget)
+        if everyone.weight >= config.tracking.relocalise.least_weight:
+            doubt.places.follow(everyone, prediction, budget)
+        else:
+            doubt.places.wait(prediction)
         found = self._nearby(doubt, everyone, prediction, budget)
         if found is not None and self._is_slip(doubt, found, everyone):
             return self._slipped(doubt, found, prediction)
-        if self.p_lost > frozen_above:
+        if self.p_lost > frozen_above or not goes_on:
             doubt.places.keep(doubt.places.explore(everyone, budget))
         shares = self._weigh(doubt.places.followed)
         for place, p in zip(doubt.places.followed, shares, strict=True):
-            if p >= 1.0 - frozen_above and self._is_certain(doubt, place, everyone):
+            if p >= 1.0 - frozen_above and self._is_certain(doubt, place, everyone, goes_on):
                 return self._relocated(doubt, place, prediction)
-        if nats >= 0.0 and self.p_lost <= frozen_above:
+        places = doubt.places
+        nowhere = places.searches > 0 and all(place.nats <= 0.0 for place in places.followed)
+        if (goes_on or nowhere) and self.p_lost <= frozen_above:
             return self._settled(doubt.local, doubt.match, prediction)
-        if nats >= 0.0:
+        if goes_on:
             doubt.write(observations, doubt.match.T_map_robot, prediction.elapsed)
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
         return Judged(
             match=doubt.match, prediction=prediction, state=state, cell_map=doubt.cell_map,
-            followed=nats >= 0.0,
+            followed=goes_on,
         )  # fmt: skip
 
     def _nearby(
@@ -251,13 +262,16 @@ class Belief:
         sure = min(p, probabilities([0.0, nats])[1]) >= 1.0 - config.frozen_above
         return sure and gain_m(doubt.cell_map, everyone, found, doubt.match) >= config.more_m
 
-    def _is_certain(self, doubt: Doubt, place: Place, everyone: Observations) -> bool:
+    def _is_certain(
+        self, doubt: Doubt, place: Place, everyone: Observations, goes_on: bool
+    ) -> bool:
         """Whether a likely place far away may be taken: after scans that are new."""
         config = self._matcher.config.belief
         asked = place.scans >= config.again and novelty(place.way) >= ENOUGH
-        explained = place.latest > 0.0 and self._unknown > 0.0 and place.waited == 0
+        explained = place.latest > 0.0 and place.waited == 0
+        broken = self._unknown > 0.0 or not goes_on
         better = probabilities([0.0, place.latest - doubt.told])[1] >= 1.0 - config.frozen_above
-        if not (asked and explained and better):
+        if not (asked and explained and better and broken):
             return False
         return gain_m(doubt.cell_map, everyone, place.match, doubt.match) >= config.far_m
 

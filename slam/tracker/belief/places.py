@@ -25,6 +25,7 @@ from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.matching.whole_search import WholeSearch
 
 ANEW = np.array([0.3, 0.35, 1.0])  # m, rad or s moved: another scan is as good as new; by hand
+MOST_ANEW = 4.0  # scans; set by hand
 LEAST = 1e-3  # share: numerical guard
 
 
@@ -49,21 +50,31 @@ class Place:
     """One where the robot may be.
 
     match    of the latest scan that was matched there, carried on by odometry
-    nats     of all scans that were, for this place against none that is known
+    told     nats of all scans that were, for this place against none that is known, each by what
+             was new of it; ``anew``: how many new ones they are
     latest   nats of the latest of them
     scans    that were matched there; ``way`` (3,) m, rad and s moved since the first of them
     asked    (3,) m, rad and s moved since the latest
+    lag      nats by which the unknown has grown since by its prior: who is carried now has seen
+             nothing there
     waited   scans since then, ``drift`` (3, 3) what odometry may be off since
     """
 
     match: Match
-    nats: float = 0.0
+    told: float = 0.0
+    anew: float = 1.0
     latest: float = 0.0
+    lag: float = 0.0
     scans: int = 1
     way: Float = field(default_factory=lambda: np.zeros(3))
     asked: Float = field(default_factory=lambda: np.zeros(3))
     waited: int = 0
     drift: Float = field(default_factory=lambda: np.zeros((3, 3)))
+
+    @property
+    def nats(self) -> float:
+        """Of the place: after a few new scans, more of them see the same surfaces again."""
+        return self.told / self.anew * min(self.anew, MOST_ANEW) - self.lag
 
     def is_at(self, T_map_robot: Float, config: RelocaliseConfig) -> bool:
         """Whether that is the same place."""
@@ -114,6 +125,10 @@ class Places:
         """Carry all on by odometry."""
         self._go_on(prediction)
         self.followed = [self._waiting(place, prediction) for place in self.followed]
+
+    def lag(self, nats: float) -> None:
+        """The unknown has grown by its prior."""
+        self.followed = [replace(place, lag=place.lag + nats) for place in self.followed]
 
     def keep(self, new: list[Place]) -> None:
         """Follow the best, one of each place, the likeliest; none that is hopeless.
@@ -173,18 +188,17 @@ class Places:
             few = min(len(observations.points_robot), self._matcher.numbers.climb.few)
             budget.spend(self._prices.approach_ns * few)
             nats = self.told(match)
-            best = self._matcher.config.belief.best
-            new.append(Place(match=match, nats=nats - best, latest=nats))
+            new.append(Place(match=match, told=nats, latest=nats))
             self.searches += self._search is None and not self._found
         return new
 
     def _matched(self, moved: Place, observations: Observations, budget: Budget) -> Place:
         """A scan says the less the less the robot has moved since the one before."""
         match = self._climb(observations, moved.match.T_map_robot, moved.drift, budget)
-        latest = self.told(match)
+        latest, new = self.told(match), novelty(moved.asked)
         return replace(
-            moved, match=match, nats=moved.nats + novelty(moved.asked) * latest, latest=latest,
-            scans=moved.scans + 1, asked=np.zeros(3), waited=0, drift=np.zeros((3, 3)),
+            moved, match=match, told=moved.told + new * latest, anew=moved.anew + new,
+            latest=latest, scans=moved.scans + 1, asked=np.zeros(3), waited=0, drift=np.zeros((3, 3)),
         )  # fmt: skip
 
     def _waiting(self, old: Place, prediction: Prediction) -> Place:

@@ -19,6 +19,7 @@ from slam.tracker.uncertainty.covariances import carried
 
 HELD_S = 0.5  # s over which the old surface that scans saw is averaged; set by hand
 FEW = 0.05  # share of the returns without weight with which the whole is left to movers; by hand
+FAR_M, FAR_RAD = 0.1, 0.05  # as far as a map of a few cm tells two poses apart; set by hand
 LEVER_M = 0.5  # m: a heading is held by old surface so far away; set by hand
 
 
@@ -104,6 +105,12 @@ class Agreement:
         own_m, own_rad = self._config.match_m, math.radians(self._config.match_deg)
         own = np.diag([own_m**2 + m**2, own_m**2 + m**2, own_rad**2 + rad**2])
         return squared(self._sum, self._variance + own) / 3.0
+
+    @property
+    def is_far(self) -> bool:
+        """Whether the corrections are so large that a map can tell both ends apart."""
+        x, y, turn = self._sum.tolist()
+        return math.hypot(x, y) > FAR_M or abs(turn) > FAR_RAD
 
     def led(self, T_map_robot: Float) -> Float:
         """(3,) the pose without the corrections of the window: where odometry leads."""
