@@ -154,11 +154,15 @@ class Belief:
         if observations.weight < config.tracking.relocalise.least_weight:
             return True, 0.0
         nats = told(config.belief, share)
-        if nats >= 0.0 or doubt is None:
+        if doubt is None:
             return True, max(nats, 0.0)
-        through_m = seen_at(doubt.cell_map, observations, match.T_map_robot).through
-        most = config.belief.hidden * max(through_m - config.belief.hidden_m, 0.0)
-        return False, max(nats, -most)
+        look = seen_at(doubt.cell_map, observations, match.T_map_robot)
+        denied_m = look.through - config.belief.hidden_m
+        if share < config.tracking.relocalise.goes_on and denied_m > look.known:
+            nats = min(nats, doubt.places.told(match))  # the map denies more than it explains
+        if nats >= 0.0:
+            return True, nats
+        return False, max(nats, -config.belief.hidden * max(denied_m, 0.0))
 
     def _on_map(self, doubt: Doubt, everyone: Observations) -> Match:
         """What the match where motion led is on the map of before the doubt."""

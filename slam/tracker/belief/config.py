@@ -17,12 +17,10 @@ class BeliefConfig(Settings):
         3.3, "nats", "a: of a share s of the returns that are explained, a logit(s)", NOT_FIT
     )
     known: float = number(
-        2.0,
-        "nats",
-        "b: added for where motion led, s being the share of the second before",
-        NOT_FIT,
-    )
-    new: float = number(4.0, "nats", "less than that for a place that is found", NOT_FIT)
+        0.0, "nats", "b: added for where motion led, s being the share of the second before",
+        NOT_FIT, low=-100.0,
+    )  # fmt: skip
+    new: float = number(2.0, "nats", "less than that for a place that is found", NOT_FIT)
     best: float = number(
         1.6, "nats", "less for one found in the whole map: the best of all is better than any one"
     )

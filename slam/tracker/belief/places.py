@@ -25,7 +25,7 @@ from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.matching.whole_search import WholeSearch
 
 ANEW = np.array([0.3, 0.35, 1.0])  # m, rad or s moved: another scan is as good as new; by hand
-MOST_ANEW = 4.0  # scans; set by hand
+MOST_ANEW = 3.0  # scans: further ones see the same surfaces again; set by hand
 LEAST = 1e-3  # share: numerical guard
 
 
@@ -198,7 +198,8 @@ class Places:
         latest, new = self.told(match), novelty(moved.asked)
         return replace(
             moved, match=match, told=moved.told + new * latest, anew=moved.anew + new,
-            latest=latest, scans=moved.scans + 1, asked=np.zeros(3), waited=0, drift=np.zeros((3, 3)),
+            latest=latest, scans=moved.scans + 1, asked=np.zeros(3), waited=0,
+            drift=np.zeros((3, 3)),
         )  # fmt: skip
 
     def _waiting(self, old: Place, prediction: Prediction) -> Place:
