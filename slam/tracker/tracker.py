@@ -198,7 +198,8 @@ class Tracker(abc.ABC):
             short_term, turn = self._matcher.reward.short_term, self._loops.n_frames
             times = step, self._pose_covariance.unseen_s
             evidence = look(self.cell_map, short_term, observations, T_map_robot, times, turn)
-            self._standing.agreement.hold(evidence.old, elapsed)
+        old = np.zeros(6) if evidence is None else evidence.old
+        self._standing.agreement.hold(old, elapsed)
         if judged.writes:
             self.cell_map.off_cm = math.ceil(min(100.0 * self._pose_covariance.off_m, MOST_OFF))
             rasterise(self.cell_map, observations, T_map_robot)

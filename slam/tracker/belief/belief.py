@@ -113,6 +113,8 @@ class Belief:
         odd = share < least or match.overlapped < least * self._matcher.usual.match
         if doubt is None and odd and per_h > 0.0:
             doubt = Doubt(cell_map, self._matcher)
+        if doubt is not None:
+            doubt.told = doubt.places.told(self._on_map(doubt, observations, match))
         goes_on, nats = self._going_on(doubt, observations, match, share)
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_LOST)
         if goes_on:
@@ -159,16 +161,18 @@ class Belief:
         look = seen_at(doubt.cell_map, observations, match.T_map_robot)
         denied_m = look.through - config.belief.hidden_m
         if share < config.tracking.relocalise.goes_on and denied_m > look.known:
-            nats = min(nats, doubt.places.told(match))  # the map denies more than it explains
+            nats = min(nats, doubt.told)  # the map denies more than it explains
+        elif self._unknown > 0.0:  # who was carried away goes on from scans there, too
+            nats = min(nats, max(doubt.told, 0.0))
         if nats >= 0.0:
             return True, nats
         return False, max(nats, -config.belief.hidden * max(denied_m, 0.0))
 
-    def _on_map(self, doubt: Doubt, everyone: Observations) -> Match:
-        """What the match where motion led is on the map of before the doubt."""
+    def _on_map(self, doubt: Doubt, observations: Observations, match: Match) -> Match:
+        """What a match to the copy is on the map of before the doubt."""
         if doubt.local is doubt.cell_map:
-            return doubt.match
-        there = doubt.match.T_map_robot
+            return match
+        there, everyone = match.T_map_robot, observations.with_votes(None)
         return self._matcher.climb(doubt.cell_map, everyone, there, there, STILL)
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
@@ -209,7 +213,6 @@ class Belief:
         prices, frozen_above = config.matching.budget, config.belief.frozen_above
         lost = self.p_lost > 0.5 or not goes_on
         budget = Budget(prices, prices.lost_share if lost else prices.frozen_share)
-        doubt.told = doubt.places.told(self._on_map(doubt, everyone))
         if everyone.weight >= config.tracking.relocalise.least_weight:
             doubt.places.follow(everyone, prediction, budget)
         else:

@@ -25,7 +25,7 @@ from slam.tracker.matching.matcher import Match, Matcher
 from slam.tracker.matching.whole_search import WholeSearch
 
 ANEW = np.array([0.3, 0.35, 1.0])  # m, rad or s moved: another scan is as good as new; by hand
-MOST_ANEW = 3.0  # scans: further ones see the same surfaces again; set by hand
+MOST_ANEW = 4.0  # scans: further ones see the same surfaces again; set by hand
 LEAST = 1e-3  # share: numerical guard
 
 

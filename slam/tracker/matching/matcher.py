@@ -25,6 +25,7 @@ from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import Reward, Seen
 
 OFTEN_S = 0.4  # scans that come more seldom say little of what moves; set by hand
+LEAST_IN_VIEW = 0.7  # share: who was carried away sees little of what was in view; set by hand
 LEAST = 1e-9  # shares are divided by the usual one
 
 
@@ -138,7 +139,7 @@ class Usual:
     @staticmethod
     def _of_known(match: Match, observations: Observations) -> float:
         """Matched share of what the scans before had in view: nothing else can go on from them."""
-        return match.overlapped / max(observations.in_view, match.overlapped, LEAST)
+        return match.overlapped / max(observations.in_view, match.overlapped, LEAST_IN_VIEW)
 
 
 class Matcher:

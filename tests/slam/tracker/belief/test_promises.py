@@ -338,6 +338,7 @@ def test_a_match_is_put_back_to_odometry_only_where_what_is_long_known_allows_it
     box = rectangle(pose[0] - 0.9, pose[1] - 0.9, pose[0] + 0.9, pose[1] + 0.9)
     room = World2D(np.concatenate([box, arena()])) if hidden else ROOMS
     monkeypatch.setattr(type(agreement), "denied", 10.0)
+    monkeypatch.setattr(type(agreement), "is_far", True)
     monkeypatch.setattr(agreement, "led", lambda T: T + np.array([0.3, 0.0, 0.0]))
     told(system, going_on(still(room, pose, 0.2), last)[:1])
     moved_m = float(np.hypot(*(system._T_map_robot - pose)[:2]))
