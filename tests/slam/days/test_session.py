@@ -82,7 +82,6 @@ def test_where_a_box_has_come_overnight_the_map_is_outdated(first, tmp_path) -> 
     assert said[1][-1] == "tracking"  # the map has learnt it
 
 
-@pytest.mark.xfail(strict=True, reason="one box outweighs all else if the robot drives for long")
 def test_in_a_room_alike_after_half_a_turn_nothing_is_found(tmp_path) -> None:
     """A box that has come, and one that has gone, cannot tell: both ends are as good."""
     path = tmp_path / "m.npz"

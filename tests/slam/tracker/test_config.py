@@ -19,8 +19,8 @@ TOP = [
 @pytest.mark.parametrize(
     ("tree", "more", "digests"),
     [
-        (ShuntingConfig, [], ("5009ca32a7a9", "7b7a9d512a70")),
-        (OccupancyConfig, ["grid"], ("796826671663", "d34e220ef8fe")),
+        (ShuntingConfig, [], ("a631069871a0", "e80ba1c14080")),
+        (OccupancyConfig, ["grid"], ("a4924042b5b7", "45e1fb746d2c")),
     ],
 )
 def test_a_tree_keeps_its_paths_its_order_and_its_digest(

@@ -262,7 +262,7 @@ def test_a_map_of_before_shares_were_weighed_is_read(
     config["belief"] |= dict.fromkeys(gone.split(), 0.5) | {"frozen_above": 0.02}
     config["matching"]["usual"] |= {"fallen": 0.8, "odd": 0.7, "outvoted": 0.75}
     config["matching"]["budget"] |= {"weigh_ns": 100.0}
-    config["standing"] |= {"alert_m": 0.5, "young_trace": 0.5}
+    config["standing"] |= {"alert_m": 0.5}
     config["tracking"]["relocalise"] |= {"kept": 20}
     back = ShuntingSlam.load(rewritten(saved[0], tmp_path / "old.npz", config=config))
     assert back.config == CONFIG.changed({"belief.frozen_above": 0.02})
