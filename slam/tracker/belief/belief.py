@@ -30,6 +30,7 @@ from slam.tracker.standing.agreement import Agreement
 
 STILL = np.diag([1e8, 1e8, 1e8])  # 1/m^2, 1/rad^2: a pose that does not move
 MOST_LOST = 100.0  # nats: seven scans that go on end any doubt; set by hand
+LEAST_IN_VIEW = 0.6  # share: who was carried sees little of what was in view; set by hand
 ENOUGH = 0.5  # of the novelty of a place far away, before it is taken; set by hand
 
 
@@ -160,7 +161,8 @@ class Belief:
             return True, max(nats, 0.0)
         look = seen_at(doubt.cell_map, observations, match.T_map_robot)
         denied_m = look.through - config.belief.hidden_m
-        if share < config.tracking.relocalise.goes_on and denied_m > look.known:
+        seen = self._matcher.usual.share(match, observations, LEAST_IN_VIEW)
+        if seen < config.tracking.relocalise.goes_on and denied_m > look.known:
             nats = min(nats, doubt.told)  # the map denies more than it explains
         elif self._unknown > 0.0:  # who was carried away goes on from scans there, too
             nats = min(nats, max(doubt.told, 0.0))

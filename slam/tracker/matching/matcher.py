@@ -25,7 +25,6 @@ from slam.tracker.matching.local_search import Around, SearchWindow, search
 from slam.tracker.matching.score import Reward, Seen
 
 OFTEN_S = 0.4  # scans that come more seldom say little of what moves; set by hand
-LEAST_IN_VIEW = 0.7  # share: who was carried away sees little of what was in view; set by hand
 LEAST = 1e-9  # shares are divided by the usual one
 
 
@@ -132,14 +131,20 @@ class Usual:
         """Share of what is remembered of a second ago that a scan replaces."""
         return min(1.0 - math.exp(-elapsed / self._config.fallen_s), 0.3)
 
-    def share(self, match: Match, observations: Observations) -> float:
-        """Of what all returns, voting or not, matched in the second before: what matches now."""
-        return self._of_known(match, observations) / max(self._overlapped, LEAST)
+    def share(
+        self, match: Match, observations: Observations, least_in_view: float = LEAST
+    ) -> float:
+        """Of what all returns, voting or not, matched in the second before: what matches now.
+
+        ``least_in_view``: share of the returns that was in view before, at least.
+        """
+        known = self._of_known(match, observations, least_in_view)
+        return known / max(self._overlapped, LEAST)
 
     @staticmethod
-    def _of_known(match: Match, observations: Observations) -> float:
+    def _of_known(match: Match, observations: Observations, least: float = LEAST) -> float:
         """Matched share of what the scans before had in view: nothing else can go on from them."""
-        return match.overlapped / max(observations.in_view, match.overlapped, LEAST_IN_VIEW)
+        return match.overlapped / max(observations.in_view, match.overlapped, least)
 
 
 class Matcher:
