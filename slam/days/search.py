@@ -271,7 +271,7 @@ class StartSearch:
     def starts(self) -> list[Start]:
         """Where it may have begun, in no order; what is left of 1: outside the map."""
         followed = self._places.followed
-        shares = probabilities([*(place.nats for place in followed), 0.0])
+        shares = probabilities([*(place.nats - self._belief.best for place in followed), 0.0])
         assert self._before is not None or not followed
         own = np.zeros(3) if self._before is None else se2.inverse(self._before[1])
         return [

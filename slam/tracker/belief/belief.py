@@ -120,7 +120,7 @@ class Belief:
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_LOST)
         if goes_on:
             self._matcher.usual.follow(match, observations, prediction.elapsed)
-        else:  # by odometry: what it was matched to says nothing
+        elif match.tau > 0.0:  # by odometry: what it was matched to says nothing
             by_odometry = unmatched(prediction.T_map_robot, matched=match.matched, score=0.0)
             match = replace(by_odometry, overlapped=match.overlapped)
         self._weigh([] if doubt is None else doubt.places.followed)

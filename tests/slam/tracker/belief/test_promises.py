@@ -357,7 +357,7 @@ def slid(disagreed: float, *, board: bool) -> float:
 def test_a_board_takes_nobody_along_and_a_room_corrects_the_wheels() -> None:
     """The board is old surface by then: only odometry denies it, which a room outweighs."""
     disagreed = FAST.standing.disagreed
-    assert slid(disagreed, board=True) < 0.1
+    assert slid(disagreed, board=True) < 0.15
     assert slid(0.0, board=True) > 0.4
     assert slid(disagreed, board=False) < 0.05
 
