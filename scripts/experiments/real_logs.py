@@ -61,7 +61,7 @@ COLUMNS: Mapping[str, str] = {  # and how its numbers are written
 }  # fmt: skip
 SUMS: Mapping[str, tuple[str, Callable[[Sequence[float]], float]]] = {  # of the logs of a SLAM
     "online_m": ("online_m", geometric), "worst": ("online_m", max),
-    "trusted": ("trusted", fmean), "least": ("trusted", min), "hazard": ("hazard", max),
+    "trusted": ("trusted", fmean), "least": ("trusted", min),
     "jumps": ("jumps", sum), "found_s": ("found_s", max), "revisits_cm": ("revisits_cm", max),
     "p999_ms": ("p999_ms", max),
 }  # fmt: skip
@@ -167,8 +167,8 @@ def summary(rows: Sequence[Row]) -> str:
     for slam, own in slams.items():
         numbers = {key: [float(row[key]) for row in own if row[key]] for key, _ in SUMS.values()}
         cells = [f"{how(v):.3g}" if (v := numbers[key]) else "–" for key, how in SUMS.values()]
-        lines.append([*slam, str(len(own)), *cells])
-    return table(["code", "slam", "logs", *SUMS], lines, left=2)
+        lines.append([*slam, *cells])
+    return table(["code", "slam", *SUMS], lines, left=2)
 
 
 def options() -> argparse.ArgumentParser:

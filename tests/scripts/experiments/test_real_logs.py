@@ -91,7 +91,7 @@ def test_logs_of_a_slam_are_summed_up():
         )
     ]
     line = real_logs.summary(rows).splitlines()[-1]
-    assert line == "| c | s | 3 | 0.2 | 0.4 | 0.8 | 0.5 | – | 3 | inf | 3 | – |"
+    assert line == "| c | s | 0.2 | 0.4 | 0.8 | 0.5 | 3 | inf | 3 | – |"
 
 
 def test_what_is_no_checkout_is_told(tmp_path: Path, capsys: pytest.CaptureFixture):
