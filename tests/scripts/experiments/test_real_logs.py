@@ -78,7 +78,7 @@ def test_a_log_is_run_in_its_checkout_and_judged(
     assert 0.1 < float(row["relations_online_m"]) < 0.4  # 0.9 of 2.6 m
     assert (back["log"], back["scans"]) == ("a, every 2, backwards", "25")
     assert float(back["online_m"]) == pytest.approx(float(row["online_m"]), abs=0.05)
-    assert "| odometry | 2 | " in page.read_text()
+    assert "| odometry | " in page.read_text()
 
 
 def test_logs_of_a_slam_are_summed_up():
