@@ -27,8 +27,9 @@ from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
 from scripts.marks import fill_page, table
 from scripts.names import file_name
-from slam.errors import InvalidValueError, SlamFailedError
+from slam.errors import InvalidValueError, LogFormatError, SlamFailedError
 from slam.files import write_bytes, write_text
+from slam.logs.unpacking import MAX_CHUNK_BYTES, XZ_MEMORY_BYTES, bounded
 from slam.shaped import one_of
 
 LOGS: Mapping[str, Log] = {
@@ -78,12 +79,19 @@ def along(path: Path, *, code: str, log: str, words: Sequence[str]) -> None:
 
 
 def unpacked(file: Path, folder: Path) -> Path:
-    """A log as its reader takes it: a packed bag is unpacked into ``folder``, once."""
+    """A log as its reader takes it: a packed bag is unpacked into ``folder``, once.
+
+    Raises ``LogFormatError`` for one that is torn, or too large.
+    """
     if not file.name.endswith(".mcap.xz"):
         return file.resolve()
     out = folder.resolve() / f"{file.parent.name}_{file.stem}"
     if not out.exists():
-        write_bytes(out, lzma.decompress(file.read_bytes()))
+        packed = lzma.LZMADecompressor(lzma.FORMAT_XZ, memlimit=XZ_MEMORY_BYTES)
+        try:
+            write_bytes(out, bounded(packed, file.read_bytes(), MAX_CHUNK_BYTES))
+        except (lzma.LZMAError, ValueError) as error:
+            raise LogFormatError(file, str(error)) from error
     return out
 
 

@@ -123,7 +123,7 @@ class Belief:
         elif match.tau > 0.0:  # by odometry: what it was matched to says nothing
             by_odometry = unmatched(prediction.T_map_robot, matched=match.matched, score=0.0)
             match = replace(by_odometry, overlapped=match.overlapped)
-        self._weigh([] if doubt is None else doubt.places.followed)
+        self._weigh(doubt)
         if doubt is None and self.p_lost <= config.belief.frozen_above:
             return self._settled(cell_map, match, prediction)
         doubt = self._doubt = doubt or Doubt(cell_map, self._matcher)
@@ -183,6 +183,7 @@ class Belief:
         if doubt is not None:
             doubt.match = match
             doubt.places.wait(prediction)
+        self._weigh(doubt)
         return Judged(
             match=match, prediction=prediction, state=State.BLIND, cell_map=cell_map,
             writes=doubt is None, followed=False,
@@ -199,13 +200,15 @@ class Belief:
             match=match, prediction=prediction, state=tracking, cell_map=cell_map, writes=True
         )
 
-    def _weigh(self, places: list[Place]) -> list[float]:
-        """Probabilities of these places; of what is left, ``p_lost`` is that of not the motion."""
+    def _weigh(self, doubt: Doubt | None) -> None:
+        """Probabilities of the places that are followed, and of not being where motion led."""
         found = self._unknown - self._matcher.config.belief.best
+        places = [] if doubt is None else doubt.places.followed
         weights = [0.0, self._unknown, *(found + place.nats for place in places)]
         of_motion, _, *others = probabilities(weights)
         self.p_lost = max(0.0, 1.0 - of_motion)
-        return others
+        if doubt is not None:
+            doubt.shares = others
 
     def _searched(
         self, doubt: Doubt, observations: Observations, prediction: Prediction, goes_on: bool
@@ -224,8 +227,8 @@ class Belief:
             return self._slipped(doubt, found, prediction)
         if self.p_lost > frozen_above or not goes_on:
             doubt.places.keep(doubt.places.explore(everyone, budget))
-        shares = self._weigh(doubt.places.followed)
-        for place, p in zip(doubt.places.followed, shares, strict=True):
+        self._weigh(doubt)
+        for place, p in zip(doubt.places.followed, doubt.shares, strict=True):
             if p >= 1.0 - frozen_above and self._is_certain(doubt, place, everyone, goes_on):
                 return self._relocated(doubt, place, prediction)
         places = doubt.places
@@ -311,8 +314,7 @@ class Belief:
         total = np.zeros((3, 3))
         if self._doubt is None:
             return total
-        places = self._doubt.places.followed
-        for place, p in zip(places, self._weigh(places), strict=True):
+        for place, p in zip(self._doubt.places.followed, self._doubt.shares, strict=True):
             off = place.match.T_map_robot - T_map_robot
             off[2] = se2.wrap(float(off[2]))
             total += p * np.multiply.outer(off, off)

@@ -26,6 +26,7 @@ class Doubt:
     cell_map      as it was before
     places        where else the robot may be
     match         of the latest scan at the place that motion led to
+    shares        probabilities of ``places.followed``
     told          nats of that scan there, on the map as it was before
     since_near_s  since a slip was searched for
     """
@@ -34,6 +35,7 @@ class Doubt:
         self.cell_map, self._local = cell_map, cell_map
         self.places = Places(cell_map, matcher)
         self.match: Match = unmatched(se2.IDENTITY, matched=0.0, score=0.0)
+        self.shares: list[float] = []
         self.told, self.since_near_s = 0.0, math.inf
 
     @property

@@ -19,7 +19,8 @@ from slam.tracker.uncertainty.covariances import carried
 
 HELD_S = 0.5  # s over which the old surface that scans saw is averaged; set by hand
 FEW = 0.05  # share of the returns without weight with which the whole is left to movers; by hand
-FAR_M, FAR_RAD = 0.05, 0.05  # as far as a map of a few cm tells two poses apart; set by hand
+FAR_M = 0.05  # m: corrections that a map of a few cm tells from none; set by hand
+FAR_RAD = 0.05  # rad, the same of the turn; set by hand
 LEVER_M = 0.5  # m: a heading is held by old surface so far away; set by hand
 
 

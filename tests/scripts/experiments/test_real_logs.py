@@ -2,6 +2,7 @@
 """The judge of real logs: a log of known motion, and what each of its columns is worth."""
 
 import csv
+import lzma
 import math
 from pathlib import Path
 
@@ -11,6 +12,7 @@ import pytest
 from scripts.experiments import judging, real_logs
 from scripts.experiments.judging import Log, Run
 from slam import se2
+from slam.errors import LogFormatError
 from tests.world2d import Drive, World2D, laser, rectangle
 
 REPO = Path(__file__).resolve().parents[3]
@@ -162,3 +164,13 @@ def test_truth_is_read_at_the_times_of_scans(tmp_path: Path):
     poses = judging.truth_of(tmp_path / "t.tum", np.array([-1.0, 2.5, 20.0]))
     assert np.isnan(poses[[0, 2]]).all()
     assert poses[1] == pytest.approx([1.25, 0.0, 0.25], abs=1e-2)
+
+
+@pytest.mark.parametrize("damage", ["torn", "none"])
+def test_a_packed_bag_that_is_damaged_is_told(tmp_path: Path, damage: str) -> None:
+    file = tmp_path / "a.mcap.xz"
+    packed = lzma.compress(bytes(range(256)) * 64)
+    file.write_bytes(packed[: len(packed) // 2] if damage == "torn" else b"no xz")
+    with pytest.raises(LogFormatError, match=r"a\.mcap\.xz"):
+        real_logs.unpacked(file, tmp_path)
+    assert sorted(tmp_path.iterdir()) == [file]

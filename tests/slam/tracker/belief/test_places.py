@@ -204,6 +204,7 @@ def test_the_covariance_is_that_of_the_mixture(monkeypatch: pytest.MonkeyPatch) 
     off = np.array([here, here, *poses])[drawn] - here  # the unknown counts by itself
     off[:, 2] = (off[:, 2] + math.pi) % math.tau - math.pi
     anywhere = np.diag([9.0, 4.0, 1.0])
+    belief._weigh(belief._doubt)
     found = belief.spread_about(here, lambda _: anywhere)
     assert belief.p_lost == pytest.approx(1.0 - shares[0])
     expected = off.T @ off / len(off) + belief.p_lost * anywhere
