@@ -47,7 +47,7 @@ COMPLETED: dict[str, tuple[str, ...]] = {
 }  # fmt: skip
 
 
-WRITTEN = ("out", "strip_to", "replay", "page", "map_out", "seal")  # options that say where to
+WRITTEN = ("out", "strip_to", "replay", "page", "map_out")  # options that say where to
 
 
 class Verb(TyperCommand):

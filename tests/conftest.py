@@ -42,7 +42,6 @@ MARKS: dict[str, tuple[str, ...]] = {
         "scenes/test_registry.py",
         "scripts/benchmark/test_days.py",
         "scripts/benchmark/test_outside.py",
-        "scripts/benchmark/test_sealed.py",
         "scripts/comparison/test_again.py",
         "scripts/comparison/test_compare.py",
         "scripts/comparison/test_oracle.py",

@@ -220,8 +220,8 @@ class Board:
         }  # fmt: skip
         rows = {f"{row['track']} {row['slam']}": {k: row[k] for k in COLUMNS} for row in self.rows}
         shares = {
-            f"{track} {slam}": self._shares(track, slam)
-            for track in self.runs for slam in self.slams if self.row(track, slam)
+            f"{track} {slam}": {"levels": row["levels"], "lost": row["lost_shares"]}
+            for track in self.runs for slam in self.slams if (row := self.row(track, slam))
         }  # fmt: skip
         tables: dict[str, Mapping[str, Any]] = {
             "tracks": tracks, "leaderboard": rows, "lost_shares": shares,
@@ -231,15 +231,6 @@ class Board:
             tables["days"] = self.days
         write_results(folder / NAMES[0], head, tables)
         write_text(folder / NAMES[2], self.markdown())
-
-    def _shares(self, track: str, slam: str) -> Row:
-        """Level by level the share of runs lost, for the picture."""
-        found: dict[float, list[int]] = {}
-        for run in self.runs[track]:
-            if run["slam"] == slam:
-                found.setdefault(float(run["dynamism"]), []).append(int(run["lost"]))
-        levels = sorted(found)
-        return {"levels": levels, "lost": [sum(found[at]) / len(found[at]) for at in levels]}
 
     def markdown(self) -> str:
         """The page."""

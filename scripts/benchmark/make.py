@@ -6,11 +6,9 @@ from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark import days, published, submission
+from scripts.benchmark import days, published, runs_file, submission
 from scripts.benchmark.board import Board
-from scripts.benchmark.published import Published
-from scripts.benchmark.sealed import SealedSeeds
-from scripts.benchmark.submission import Submission
+from scripts.benchmark.runs_file import At, Digests, Results, checked_name
 from scripts.benchmark.tracks import LEVELS, QUICK_LEVELS, TEST, TRACKS, TRAIN, Track
 from scripts.comparison.folder import Compared
 from scripts.comparison.make import carry_out as compare
@@ -27,7 +25,6 @@ from slam.errors import InvalidValueError, MissingDependencyError
 
 COMMAND = "benchmark"
 SEEDS, QUICK_SEEDS = 6, 1
-Digests = dict[str, dict[tuple[float, int], str]]  # of recordings, by track, level and seed
 Runs = dict[str, list[dict[str, Any]]]  # rows of runs.csv by track
 
 
@@ -37,7 +34,6 @@ class Wanted:
 
     slams    beside the controls of each track; the subject is one of them
     train    on the seeds that are for tuning, not on those that count
-    sealed   on these seeds instead
     seeds    how many
     quick    three levels only: runs of the full benchmark, which goes on from there
     seconds  of each run, instead of the track's own; such a board is for trying out
@@ -50,7 +46,6 @@ class Wanted:
     slams: tuple[str, ...]
     subject: str
     train: bool = False
-    sealed: SealedSeeds | None = None
     seeds: int = SEEDS
     quick: bool = False
     seconds: float | None = None
@@ -60,11 +55,9 @@ class Wanted:
 
     def __post_init__(self) -> None:
         if self.submit is not None:
-            submission.checked_name(self.submit, self.subject)
+            checked_name(self.submit, self.subject)
         if self.subject not in self.slams:
             raise InvalidValueError(f"the subject {self.subject!r:.80} is none of the SLAMs")
-        if self.sealed is not None:
-            self.sealed.check_for(self.tracks)
         most = min(len(self.seeds_of(track)) for track in self.tracks)
         if not 1 <= self.seeds <= most:
             raise InvalidValueError(f"--seeds must be 1 to {most}, got {self.seeds}")
@@ -78,8 +71,6 @@ class Wanted:
 
     def seeds_of(self, track: Track) -> tuple[int, ...]:
         """All that there are of that kind."""
-        if self.sealed is not None:
-            return self.sealed.seeds
         return track.train if self.train else track.test
 
     def plan(self, track: Track, oracles: bool = True) -> Plan:
@@ -92,11 +83,11 @@ class Wanted:
     @property
     def public(self) -> bool:
         """Whether these are runs that can have been published."""
-        return not self.train and self.sealed is None and self.seconds is None
+        return not self.train and self.seconds is None
 
     def buildings(self) -> Buildings:
         """Of the section over days."""
-        known = self.sealed.seeds if self.sealed else TRAIN if self.train else TEST
+        known = TRAIN if self.train else TEST
         return days.buildings(
             self.slams, known[: self.seeds], quick=self.quick, seconds=self.seconds
         )
@@ -107,7 +98,7 @@ class Wanted:
         seeds = list(dict.fromkeys(each))
         return {
             "tracks_run": [track.name for track in self.tracks],
-            "seeds_of": submission.SEALED if self.sealed else submission.SETS[self.train],
+            "seeds_of": "train" if self.train else "test",
             "seeds": seeds,
             "levels_run": list(self.levels),
             "quick": self.quick,
@@ -139,8 +130,8 @@ def carry_out(
     *,
     jobs: int = 1,
     cluster: str | None = None,
-    merge: Sequence[Submission] = (),
-    shared: Published | None = None,
+    merge: Sequence[Results] = (),
+    shared: Results | None = None,
 ) -> Board:
     """Make what is missing in ``out``, a folder of ``compare`` for each track; the leaderboard.
 
@@ -163,26 +154,26 @@ def carry_out(
         digests = {name: published.digests(plan, out / name) for name, plan in plans.items()}
         lives = wanted.buildings() if wanted.days else None
         aged = [] if lives is None else live(lives, out / DAYS, jobs=jobs, cluster=cluster)
-        own = None if wanted.submit is None else _submission(wanted, runs, digests, out)
+        own = None if wanted.submit is None else _submitted(wanted, runs, digests, out)
         for one in merge:
-            for name in plans:
-                runs[name] = runs[name] + _on_the_same_scans(one, name, digests[name])
+            _check_scans(one, digests)
         if shared is not None:
-            _told_of_others(shared, digests)
-            for name in plans:
+            _tell_of_others(shared, digests)
+        for name in plans:
+            for one in (*merge, *filter(None, [shared])):
                 there = {row["slam"] for row in runs[name]}
-                runs[name] = runs[name] + shared.rows(name, digests[name], tuple(there))
+                runs[name] = runs[name] + one.rows(name, digests[name], there)
         with written() as staged:
             made = _board(wanted, runs, merge, aged)
             made.write(staged)
             if lives is not None:
                 days.write(staged, days.head(lives), aged)
             if own is not None:
-                submission.write(staged / submission.file_of(own.name), own)
+                runs_file.write(staged / submission.file_of(own.name), own)
     return made
 
 
-def plans_of(wanted: Wanted, shared: Published | None) -> dict[str, Plan]:
+def plans_of(wanted: Wanted, shared: Results | None) -> dict[str, Plan]:
     """The comparison of each track by name, without the oracles whose runs ``shared`` has."""
     shared = shared if wanted.public else None
     return {
@@ -191,15 +182,15 @@ def plans_of(wanted: Wanted, shared: Published | None) -> dict[str, Plan]:
     }
 
 
-def _has_oracles(shared: Published, wanted: Wanted, track: Track) -> bool:
+def _has_oracles(shared: Results, wanted: Wanted, track: Track) -> bool:
     asked = [(run.dynamism, run.seed) for run in wanted.plan(track).runs()]
     return all(shared.has(track.name, asked, oracle) for oracle in track.oracles)
 
 
-def _told_of_others(shared: Published, digests: Digests) -> None:
+def _tell_of_others(shared: Results, digests: Mapping[str, Digests]) -> None:
     """A note where the recordings here are others than the published ones."""
     here = sum(map(len, digests.values()))
-    if others := sum(shared.others(name, own) for name, own in digests.items()):
+    if others := sum(len(shared.others(name, own)) for name, own in digests.items()):
         note(
             f"{others} of {here} recordings are others here than those of the published runs (made "
             "by another version of MuJoCo or NumPy, or on another kind of processor): the SLAMs "
@@ -207,7 +198,7 @@ def _told_of_others(shared: Published, digests: Digests) -> None:
         )
 
 
-def _board(wanted: Wanted, runs: Runs, merge: Sequence[Submission], aged: Sequence[Row]) -> Board:
+def _board(wanted: Wanted, runs: Runs, merge: Sequence[Results], aged: Sequence[Row]) -> Board:
     head = {**wanted.head(), "versions": versions(), "machine": machine()}
     return Board(
         subject=wanted.subject, head=head, tracks=wanted.tracks, runs=runs, missing=wanted.missing,
@@ -216,49 +207,37 @@ def _board(wanted: Wanted, runs: Runs, merge: Sequence[Submission], aged: Sequen
     )  # fmt: skip
 
 
-def _submission(wanted: Wanted, runs: Runs, digests: Digests, out: Path) -> Submission:
-    kept: Runs = {}
+def _submitted(wanted: Wanted, runs: Runs, digests: Mapping[str, Digests], out: Path) -> Results:
+    """The subject's runs, for others."""
+    name, slam = str(wanted.submit), wanted.subject
+    kept: dict[str, dict[At, tuple[str, dict[str, Row]]]] = {}
     for track, rows in runs.items():
-        compared, own = Compared(out / track), [r for r in rows if r["slam"] == wanted.subject]
-        kept[track] = [
-            submission.run_of(
-                row, digests[track][row["dynamism"], row["seed"]],
-                _poses(compared, row, wanted.subject),
-            )
-            for row in own
-        ]  # fmt: skip
-    head, name = wanted.head(), wanted.submit
-    assert name is not None
-    return Submission(
-        name=name, slam=wanted.subject, seeds_of=head["seeds_of"], seeds=tuple(head["seeds"]),
-        levels=wanted.levels, seconds=wanted.seconds, runs=kept,
-        made_with=submission.made_with(wanted.subject),
-    )  # fmt: skip
+        compared, own = Compared(out / track), kept.setdefault(track, {})
+        for row in (row for row in rows if row["slam"] == slam):
+            at = (row["dynamism"], row["seed"])
+            said = compared.run(row["scene"], *at).believed(slam)
+            poses = submission.digest_of(said.stamps_ns, said.poses)
+            own[at] = (digests[track][at], {name: submission.run_of(row, poses)})
+    made_with = submission.made_with(slam)
+    return Results(name=name, slam=slam, seconds=wanted.seconds, runs=kept, made_with=made_with)
 
 
-def _poses(compared: Compared, row: Mapping[str, Any], slam: str) -> str:
-    """Digest of what it said in that run."""
-    said = compared.run(row["scene"], row["dynamism"], row["seed"]).believed(slam)
-    return submission.digest_of(said.stamps_ns, said.poses)
-
-
-def _check_alike(merge: Sequence[Submission], wanted: Wanted, taken: set[str]) -> None:
+def _check_alike(merge: Sequence[Results], wanted: Wanted, taken: set[str]) -> None:
     """``InvalidValueError`` for one that did not run what is to be run here, or is called alike."""
-    head, of = wanted.head(), {track.name: wanted.seeds_of(track) for track in wanted.tracks}
+    of = {
+        track.name: tuple(sorted(wanted.seeds_of(track)[: wanted.seeds])) for track in wanted.tracks
+    }
     for one in merge:
         shared = [track for track in one.runs if track in of]
         if not shared:
             raise InvalidValueError(
                 f"submission {one.name!r}: the board has none of its tracks: {', '.join(one.runs)}"
             )
-        pairs = [
-            ("kind of seeds", one.seeds_of, head["seeds_of"]),
-            ("levels", one.levels, wanted.levels), ("seconds", one.seconds, wanted.seconds),
-        ]  # fmt: skip
+        pairs: list[tuple[str, Any, Any]] = [("seconds", one.seconds, wanted.seconds)]
         for track in shared:
-            ran = {run["seed"] for run in one.runs[track]}
-            theirs = tuple(seed for seed in one.seeds if seed in ran)
-            pairs.append((f"seeds of {track}", theirs, of[track][: wanted.seeds]))
+            levels, seeds = ({at[k] for at in one.runs[track]} for k in (0, 1))
+            pairs += [("levels", tuple(sorted(levels)), wanted.levels)]
+            pairs += [(f"seeds of {track}", tuple(sorted(seeds)), of[track])]
         for what, a, b in pairs:
             if a != b:
                 raise InvalidValueError(
@@ -269,18 +248,15 @@ def _check_alike(merge: Sequence[Submission], wanted: Wanted, taken: set[str]) -
         taken.add(one.name)
 
 
-def _on_the_same_scans(
-    one: Submission, track: str, digests: dict[tuple[float, int], str]
-) -> list[dict[str, Any]]:
-    rows = one.rows(track)
-    for row in rows:
-        if row["recording"] != digests[row["dynamism"], row["seed"]]:
+def _check_scans(one: Results, digests: Mapping[str, Digests]) -> None:
+    """``InvalidValueError`` for a submission that ran on other scans than those here."""
+    for track, own in digests.items():
+        for level, seed in one.others(track, own):
             raise InvalidValueError(
-                f"submission {one.name!r}: {track}, level {row['dynamism']:g}, seed {row['seed']} "
+                f"submission {one.name!r}: {track}, level {level:g}, seed {seed} "
                 "is of other scans than here: made by another version of mobilia, MuJoCo or NumPy, "
                 "or on another kind of processor"
             )
-    return rows
 
 
 # A control; and one that runs on corners of the paper's kind, not on scans.

@@ -18,9 +18,9 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
 
-from scripts.benchmark import days, published
+from scripts.benchmark import days
 from scripts.benchmark.board import RANKED_HEADS, Board
-from scripts.benchmark.published import Published
+from scripts.benchmark.runs_file import Results, read
 from scripts.benchmark.scores import Row
 from scripts.benchmark.tracks import LEVELS, Track, newest
 from scripts.comparison.tables import write_csv
@@ -45,7 +45,7 @@ _CONTROL = "#9a9a9a"
 _MARKERS = "osD^vP*Xh<>d"
 
 
-def tracks_of(of: Published) -> list[Track]:
+def tracks_of(of: Results) -> list[Track]:
     """The newest version of each that it has runs of."""
     return [track for track in newest().values() if track.name in of.runs]
 
@@ -61,16 +61,13 @@ def tracks_table(tracks: Sequence[Track]) -> str:
     return table(heads, rows, left=4)
 
 
-def board_of(of: Published) -> Board:
+def board_of(of: Results) -> Board:
     """What ships, as a board."""
-    runs = {
-        track.name: of.rows(track.name, {at: own[0] for at, own in of.runs[track.name].items()}, ())
-        for track in tracks_of(of)
-    }
+    runs = {track.name: of.rows(track.name) for track in tracks_of(of)}
     return Board(subject="shunting", head={}, tracks=tracks_of(of), runs=runs)
 
 
-def shipped(of: Published) -> str:
+def shipped(of: Results) -> str:
     """The ranking, and what it is of."""
     board = board_of(of)
     made, on = of.made_with, of.made_with["machine"]["processor"]
@@ -86,11 +83,11 @@ def shipped(of: Published) -> str:
 
 
 def _ranked_runs(board: Board) -> str:
-    one, counting = board.ranking[0], len(published.read().quick(board.tracks))
+    one, counting = board.ranking[0], len(read().quick(board.tracks))
     return f"{one['runs']} runs: {counting} tracks that count, levels {_list(one['levels'])}"
 
 
-def at_the_top(of: Published) -> str:
+def at_the_top(of: Results) -> str:
     """Runs lost at level 1, of how many: a row for each track, a column for each SLAM."""
     board = board_of(of)
     rows = {track.name: board.one_oracle(track, track.oracle) for track in board.tracks}
@@ -125,7 +122,7 @@ def publish(docs: Path, results: Path, aged: Path | None, commit: str) -> None:
             head = f'{{\n "command": {command},\n "commit": {json.dumps(commit)},\n'
             text = text.replace("{\n", head, 1)
         write_text(copy, text)
-    of = published.read()
+    of = read()
     board = board_of(of)
     overall(board.ranking, _ranked_runs(board), docs / "pictures" / "benchmark.png")
     for page, mark, told in (

@@ -127,34 +127,48 @@ def spearman(errors: Mapping[float, float]) -> float | None:
 
 def score(track: Track, slam: str, rows: Sequence[Row]) -> Row:
     """The row of one SLAM: ``rows`` are its runs on the track, each level with the same seeds."""
-    levels = sorted({float(row["dynamism"]) for row in rows})
-    seeds = sorted({int(row["seed"]) for row in rows})
-    table = np.zeros((len(seeds), len(levels)))
-    for row in rows:
-        table[seeds.index(int(row["seed"])), levels.index(float(row["dynamism"]))] = row["lost"]
-    low, high = lost_from_interval(levels, table)
-    errors = _values(rows, TRACKING)
-    between = by_seed_interval(_by_seed(rows, TRACKING))
+    low, high = by_seed_interval(_by_seed(rows, TRACKING))
     silent = _values(rows, SILENT)
+    lost = summed([((int(row["seed"]),), row) for row in rows])
     return {
         "track": track.name,
         "slam": slam,
-        "seeds": len(seeds),
-        "runs": len(rows),
-        "lost_runs": int(table.sum()),
+        "seeds": len({int(row["seed"]) for row in rows}),
+        **lost,
         "failed_runs": sum(row["outcome"] in FAILED for row in rows),
-        "lost_from": lost_from(levels, table.mean(axis=0)),
-        "lost_from_low": low,
-        "lost_from_high": high,
-        "lost_at_top": float(table[:, -1].mean()),
-        TRACKING: quantile(errors, 0.5) if errors else None,
-        f"{TRACKING}_low": between[0],
-        f"{TRACKING}_high": between[1],
-        f"{TRACKING}_runs": len(errors),
+        "lost_at_top": lost["lost_shares"][-1],
+        f"{TRACKING}_low": low,
+        f"{TRACKING}_high": high,
         SILENT: sum(silent) / len(silent) if silent else None,
         "spearman": spearman(drift_by_level(rows)),
         "spearman_ate": spearman(by_level(rows, ATE)),
         **{cost: quantile(v, 0.5) if (v := _values(rows, cost)) else None for cost in COSTS},
+    }
+
+
+def summed(runs: Sequence[tuple[tuple[Any, ...], Row]]) -> Row:
+    """What was lost of a SLAM's runs, from which level on, and the error; a run with its room.
+
+    A room, such as a seed of a track, is drawn whole: one without a run at each level gives none to
+    the interval.
+    """
+    levels = sorted({float(row["dynamism"]) for _, row in runs})
+    rooms = sorted({room for room, _ in runs})
+    table = np.full((len(rooms), len(levels)), np.nan)
+    for room, row in runs:
+        table[rooms.index(room), levels.index(float(row["dynamism"]))] = row["lost"]
+    low, high = lost_from_interval(levels, table[~np.isnan(table).any(axis=1)])
+    shares, errors = np.nanmean(table, axis=0), _values([row for _, row in runs], TRACKING)
+    return {
+        "levels": levels,
+        "lost_shares": shares.tolist(),
+        "runs": len(runs),
+        "lost_runs": int(np.nansum(table)),
+        "lost_from": lost_from(levels, shares),
+        "lost_from_low": low,
+        "lost_from_high": high,
+        TRACKING: quantile(errors, 0.5) if errors else None,
+        f"{TRACKING}_runs": len(errors),
     }
 
 
@@ -197,11 +211,11 @@ def _badness(of: Row) -> tuple[bool, float]:
 def scores(track: Track, rows: Sequence[Row]) -> tuple[Row, list[Row]]:
     """``fairness`` of the track, and a row for each SLAM that made all its runs, in their order."""
     fair = fairness(track, rows)
-    every = {slam: {_run(row) for row in rows if row["slam"] == slam}
-             for slam in dict.fromkeys(row["slam"] for row in rows)}  # fmt: skip
-    most = set().union(*every.values())
-    slams = [slam for slam, own in every.items() if own == most]
-    table = [score(track, s, [row for row in rows if row["slam"] == s]) for s in slams]
+    every: dict[str, list[Row]] = {}
+    for row in rows:
+        every.setdefault(row["slam"], []).append(row)
+    most = set(map(_run, rows))
+    table = [score(track, s, own) for s, own in every.items() if set(map(_run, own)) == most]
     return fair, [row | {"counts": fair["counts"]} for row in table]
 
 
@@ -227,8 +241,14 @@ def ranking(runs: Mapping[str, Sequence[Row]], subject: str) -> list[Row]:
             made.setdefault(row["slam"], {})[track, *_run(row)] = row
     times = Counter(run for own in made.values() for run in own)
     same = sorted(run for run in made.get(subject, ()) if 2 * times[run] > len(made))
-    of = [_ranked(slam, [(run, own[run]) for run in same])
-          for slam, own in made.items() if same and own.keys() >= set(same)]  # fmt: skip
+    of = [
+        {
+            "slam": slam,
+            **summed([((track, seed), own[track, at, seed]) for track, at, seed in same]),
+        }
+        for slam, own in made.items()
+        if same and own.keys() >= set(same)
+    ]
     return sorted(
         of,
         key=lambda row: (
@@ -237,20 +257,3 @@ def ranking(runs: Mapping[str, Sequence[Row]], subject: str) -> list[Row]:
             math.inf if row[TRACKING] is None else row[TRACKING],
         ),
     )
-
-
-def _ranked(slam: str, runs: Sequence[tuple[tuple[str, float, int], Row]]) -> Row:
-    levels = sorted({run[1] for run, _ in runs})
-    rooms = sorted({(run[0], run[2]) for run, _ in runs})  # a track's seed is drawn whole
-    table = np.full((len(rooms), len(levels)), np.nan)
-    for (track, level, seed), row in runs:
-        table[rooms.index((track, seed)), levels.index(level)] = row["lost"]
-    whole = table[~np.isnan(table).any(axis=1)]
-    low, high = lost_from_interval(levels, whole)
-    errors, shares = _values([row for _, row in runs], TRACKING), np.nanmean(table, axis=0)
-    return {
-        "levels": levels, "lost_shares": shares.tolist(), "slam": slam,
-        "runs": len(runs), "lost_runs": int(np.nansum(table)),
-        "lost_from": lost_from(levels, shares), "lost_from_low": low, "lost_from_high": high,
-        TRACKING: quantile(errors, 0.5) if errors else None, f"{TRACKING}_runs": len(errors),
-    }  # fmt: skip

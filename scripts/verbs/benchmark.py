@@ -12,13 +12,11 @@ from rich.table import Table
 from scripts.console import console, note, say
 from scripts.names import check
 from scripts.options import Cluster, Jobs, PlanOnly, Set, named
-from slam.errors import InvalidValueError, MissingPathError
+from slam.errors import MissingPathError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
     from scripts.benchmark.board import Board
-    from scripts.benchmark.sealed import SealedSeeds
-
 
 UNFAIR = "* does not count: no oracle holds there"
 MOST_COLUMNS = 5  # SLAMs in the table of the terminal; the page has all
@@ -50,14 +48,6 @@ def benchmark(
     train: Annotated[
         bool, typer.Option("--train", help="On the seeds for tuning, not on those that count.")
     ] = False,
-    sealed: Annotated[
-        Path | None,
-        typer.Option(help="On the seeds of this file, which were published as a hash first."),
-    ] = None,
-    seal: Annotated[
-        Path | None,
-        typer.Option(help="Only draw secret seeds, write them here, and print their hash."),
-    ] = None,
     seeds: Annotated[
         int | None, typer.Option(help="Seeds at every level; default 6, with --quick 1.")
     ] = None,
@@ -89,15 +79,10 @@ def benchmark(
 
     [bold]mobilia benchmark --quick --slam my_package:MySlam --jobs 2[/bold]
     """
-    if seal is not None:
-        if slam or subject or sealed or submit or merge:
-            raise InvalidValueError("--seal only draws seeds: beside it goes --seeds alone")
-        _seal(seal, seeds)
-        return
     slams = named(slam or [])
     check((*slams, *([subject] if subject else [])))
     from scripts import pace, workers
-    from scripts.benchmark import published, submission
+    from scripts.benchmark import runs_file
     from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, plans_of, wanted_of
     from scripts.benchmark.tracks import chosen
     from scripts.comparison.plan import ahead
@@ -106,12 +91,10 @@ def benchmark(
     for path in merge or ():
         if not path.exists():
             raise MissingPathError(path, "no such file")
-    shared = [path for path in merge or () if published.is_one(path)]
-    others = [submission.read(path) for path in merge or () if path not in shared]
-    ship = published.read(shared[-1] if shared else published.FILE)
-    drawn = None if sealed is None else _opened(sealed, train)
-    most = SEEDS if drawn is None else len(drawn.seeds)
-    count = seeds if seeds is not None else min(QUICK_SEEDS if quick else most, most)
+    given = [runs_file.read(path) for path in merge or ()]
+    others = [one for one in given if one.name]
+    ship = next((one for one in reversed(given) if not one.name), None) or runs_file.read()
+    count = seeds if seeds is not None else QUICK_SEEDS if quick else SEEDS
     runs = tuple(dict.fromkeys((*slams, *([subject] if subject else []))))
     numbered = dict(zip(runs, with_set(runs, set_ or []), strict=True))
     asked = chosen(named(tracks or []))
@@ -120,8 +103,7 @@ def benchmark(
     wanted = wanted_of(
         asked, [numbered[name] for name in slams],
         None if subject is None else numbered[subject],
-        train=train, sealed=drawn, seeds=count, quick=quick, seconds=seconds, submit=submit,
-        days=days,
+        train=train, seeds=count, quick=quick, seconds=seconds, submit=submit, days=days,
     )  # fmt: skip
     parts = [ahead(plan, out / name) for name, plan in plans_of(wanted, ship).items()]
     works = [job.work() for missing, _ in parts for job in missing]
@@ -132,26 +114,6 @@ def benchmark(
     started = time.perf_counter()
     board = carry_out(wanted, out, jobs=jobs, cluster=cluster, merge=others, shared=ship)
     _tell(board, out, time.perf_counter() - started)
-
-
-def _seal(path: Path, seeds: int | None) -> None:
-    from scripts.benchmark import sealed
-    from scripts.benchmark.make import SEEDS
-
-    drawn = sealed.drawn(SEEDS if seeds is None else seeds)
-    sealed.write(path, drawn)
-    console.print(f"{escape(str(path))}: {len(drawn.seeds)} seeds. Keep it; publish this hash:")
-    say(drawn.sha256)
-
-
-def _opened(path: Path, train: bool) -> "SealedSeeds":
-    from scripts.benchmark import sealed
-
-    if train:
-        raise InvalidValueError("--sealed and --train are seeds of two kinds: give one of them")
-    opened = sealed.read(path)
-    note(f"sealed seeds: their hash is {opened.sha256}")
-    return opened
 
 
 def _tell(board: "Board", out: Path, spent_s: float) -> None:

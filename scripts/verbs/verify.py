@@ -13,7 +13,6 @@ from scripts.options import Trust, admitted
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
-    from scripts.benchmark.submission import Submission
     from sim.recording.verify import Finding
 
 _COLORS = {
@@ -38,9 +37,6 @@ def verify(
     ] = 0,
     slam: Annotated[
         str | None, typer.Option(help="The SLAM to --rerun; default the one that the file names.")
-    ] = None,
-    sealed: Annotated[
-        Path | None, typer.Option(help="Of a submission: its seeds are those of this file.")
     ] = None,
     seed: Annotated[
         int | None,
@@ -69,13 +65,13 @@ def verify(
         findings = check(folder)
     checked = len(findings)
     submitted = folder.suffix == ".json" and folder.is_file()
-    if not submitted and (rerun or slam or sealed):
-        raise InvalidValueError("--rerun, --slam and --sealed are for a submission")
+    if not submitted and (rerun or slam):
+        raise InvalidValueError("--rerun and --slam are for a submission")
     if slam is not None and not rerun:
         raise InvalidValueError("--slam is the SLAM to --rerun: say how many runs")
     if submitted and findings[0].ok:
         seed = _by_chance(regenerate_ or rerun) if seed is None else seed
-        findings += _of_submission(folder, regenerate_, rerun, seed, slam, sealed, trust)
+        findings += _of_submission(folder, regenerate_, rerun, seed, slam, trust)
     elif regenerate_:
         findings += _made_again(_drawn(_sound(folder, findings), regenerate_, seed or 0), trust)
     for finding in findings:
@@ -88,17 +84,14 @@ def verify(
 
 
 def _of_submission(
-    path: Path, regenerate_: int, rerun: int, seed: int, slam: str | None, sealed: Path | None,
-    trust: bool,
-) -> "list[Finding]":  # fmt: skip
+    path: Path, regenerate_: int, rerun: int, seed: int, slam: str | None, trust: bool
+) -> "list[Finding]":
     """A finding for each of its runs that was made again."""
     from scripts.benchmark import submission
     from scripts.benchmark.submission import made_again
     from slam.names import NameFromFile
 
     given = submission.read(path)
-    if sealed is not None:
-        _check_sealed(given, sealed)
     runs = None
     if rerun:
         named = NameFromFile(given.slam, path)
@@ -112,22 +105,6 @@ def _by_chance(count: int) -> int:
     if count:
         console.print(f"drawn with --seed {seed}")
     return seed
-
-
-def _check_sealed(given: "Submission", path: Path) -> None:
-    from scripts.benchmark import sealed, submission
-    from scripts.benchmark.tracks import LEVELS
-
-    opened = sealed.read(path)
-    wanted = opened.seeds[: len(given.seeds)]
-    if given.seeds_of != submission.SEALED or given.seeds != wanted:
-        raise InvalidValueError(f"the seeds of {given.name!r} are not those of {path}")
-    say(f"its seeds were sealed as {opened.sha256}")
-    seconds = "as long as the tracks say" if given.seconds is None else f"{given.seconds:g} s"
-    say(
-        f"it has {len(given.seeds)} of {len(opened.seeds)} sealed seeds, {len(given.levels)} of "
-        f"{len(LEVELS)} levels, {len(given.runs)} of {len(opened.tracks)} tracks, runs {seconds}"
-    )
 
 
 def _judgement(again: int, rerun: int) -> str:

@@ -11,7 +11,7 @@ from typing import Any
 
 import numpy as np
 
-from scripts.benchmark import submission
+from scripts.benchmark import runs_file, submission
 from scripts.closed_loop.plan import Plan as DrivePlan
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.output import write_recipe
@@ -77,7 +77,7 @@ class Hostile:
     def submission(self) -> Path:
         """A result file of ``mobilia benchmark``."""
         path = self.path / submission.file_of("mine")
-        submission.write(path, replace(submitted(), slam=self.pipe))
+        runs_file.write(path, replace(submitted(), slam=self.pipe))
         return path
 
     def run(self, *, scene: str = SCENE, slam: str = SLAM, **more: Any) -> Path:

@@ -9,9 +9,9 @@ from typing import Any
 
 import pytest
 
-from scripts.benchmark import make, submission
+from scripts.benchmark import make, runs_file, submission
 from scripts.benchmark.make import Wanted
-from scripts.benchmark.submission import Submission
+from scripts.benchmark.runs_file import Results, checked_name
 from scripts.benchmark.tracks import LEVELS, newest
 from scripts.comparison import recording
 from scripts.result_files import MAX_BYTES
@@ -20,6 +20,7 @@ from sim.core.versions import WorldVersionError
 from slam.errors import InvalidValueError, LogFormatError
 
 TRACK = newest()["tour-guide"].name
+KEY = f"{TRACK} 0 720"
 ROW = {
     "outcome": "finished", "failure": None, "lost": 0, "scans": 282.0, "lost_at_s": None,
     "ate_unaligned_m": 0.01, "error_tracking_m": 0.01, "silent_share": float("nan"),
@@ -27,112 +28,133 @@ ROW = {
 }  # fmt: skip
 
 
-def made() -> Submission:
-    runs = [
-        submission.run_of({**ROW, "dynamism": level, "seed": seed}, f"{seed:064x}", "a" * 64)
+def made() -> Results:
+    runs = {
+        (level, seed): (f"{seed:064x}", {"mine": submission.run_of(ROW, "a" * 64)})
         for level in LEVELS
         for seed in (720, 721)
-    ]
-    return Submission(
-        name="mine", slam="my_slam:MySlam", seeds_of="test", seeds=(720, 721), levels=LEVELS,
-        seconds=None, runs={TRACK: runs}, made_with=submission.made_with("odometry"),
-    )  # fmt: skip
+    }
+    made_with = submission.made_with("odometry")
+    return Results(name="mine", slam="my_slam:MySlam", runs={TRACK: runs}, made_with=made_with)
 
 
 @pytest.fixture
 def file(tmp_path: Path) -> Path:
     path = tmp_path / submission.file_of("mine")
-    submission.write(path, made())
+    runs_file.write(path, made())
     return path
+
+
+def rewritten(file: Path, change: Callable[[dict[str, Any]], Any]) -> None:
+    """The file with that change, and the digest of what it holds now."""
+    data = json.loads(file.read_text())
+    change(data)
+    data.pop("sha256")
+    data["sha256"] = runs_file._sha256(data)
+    file.write_text(json.dumps(data))
 
 
 def test_it_comes_back(file: Path):
     found, wanted = submission.read(file), made()
-    for name in ("name", "slam", "seeds_of", "seeds", "levels", "seconds", "runs"):
+    for name in ("name", "slam", "seconds", "runs", "made_with"):
         assert getattr(found, name) == getattr(wanted, name)
     row = found.rows(TRACK)[0]
     assert (row["slam"], row["dynamism"], row["silent_share"]) == ("mine", 0.0, None)
-    assert row["peak_memory_mb"] is None  # of another machine
-    assert found.runs[TRACK][0]["peak_memory_mb"] == 12.0
+    assert "peak_memory_mb" not in row  # of another machine
+    assert found.runs[TRACK][0.0, 720][1]["mine"]["peak_memory_mb"] == 12.0
     assert found.rows("no-walls-v1") == []
     assert found.origin()["slam"] == "my_slam:MySlam"
     assert "mujoco" in found.origin()["made_with"]
 
 
-def test_tracks_of_other_seeds_are_in_one_file(tmp_path: Path):
-    """Each with the runs of its own seeds, no fewer."""
-    other, path = newest()["moving-boards"].name, tmp_path / submission.file_of("mine")
-    one, whole = made(), {**made().runs}
-    whole[other] = [{**run, "seed": run["seed"] + 186} for run in whole[TRACK]]  # from 906 on
-    submission.write(path, replace(one, seeds=(720, 721, 906, 907), runs=whole))
-    assert submission.read(path).runs == whole
-    submission.write(path, replace(one, seeds=(720, 721, 906, 907), runs={**whole, other: []}))
-    with pytest.raises(LogFormatError, match=f"{other}: expected 10 runs"):
-        submission.read(path)
-    submission.write(path, replace(one, runs={**whole, other: []}))
-    with pytest.raises(LogFormatError, match=f"{other}: none of its seeds"):
-        submission.read(path)
+def test_the_runs_that_ship_are_the_same_file_but_no_submission():
+    assert runs_file.read().name == ""
+    with pytest.raises(LogFormatError, match="no submission: it holds runs of many SLAMs"):
+        submission.read(runs_file.FILE)
 
 
-def first_run(data: dict[str, Any], **values: Any) -> None:
-    data["tracks"][TRACK]["runs"][0].update(values)
+def test_each_track_has_each_level_with_each_of_its_own_seeds(file: Path):
+    one, other = made(), newest()["moving-boards"].name
+    of = {(at, seed + 186): run for (at, seed), run in one.runs[TRACK].items()}  # from 906 on
+    runs_file.write(file, replace(one, runs={**one.runs, other: of}))
+    assert submission.read(file).runs == {**one.runs, other: of}
+    fewer = dict(list(of.items())[1:])
+    for runs, words in ((fewer, "each level and seed"), (one.runs[TRACK], "seeds that are not")):
+        with pytest.raises(InvalidValueError, match=f"{other}: .*{words}"):
+            replace(one, runs={**one.runs, other: runs})
+
+
+def cell(data: dict[str, Any], name: str, value: Any) -> None:
+    """Another value in a column of the first run."""
+    data["runs"][KEY]["slams"]["mine"][data["columns"].index(name)] = value
+
+
+def moved(data: dict[str, Any], key: str) -> None:
+    data["runs"][key] = data["runs"].pop(KEY)
+
+
+def submitted(data: dict[str, Any], **values: Any) -> None:
+    data["submitted"].update(values)
 
 
 HUGE = 10**400  # JSON has it, no double holds it
 WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
-    "schema": (lambda d: d.update(schema=1), "of schema 2"),
-    "what": (lambda d: d.update(what="a recipe"), "no submission"),
-    "name": (lambda d: d.update(name="../x"), "name must be up to 40"),
-    "slam": (lambda d: d.update(slam="a\nb"), "slam must be"),
-    "seeds_of": (lambda d: d.update(seeds_of="best"), "test or train or sealed"),
-    "seeds": (lambda d: d.update(seeds=[720, 720]), "seeds must be whole"),
-    "one seed": (lambda d: d.update(seeds=[720]), "expected 5 runs"),
-    "levels": (lambda d: d.update(levels=[0.0, 0.3]), "levels must be of"),
-    "seconds": (lambda d: d.update(seconds=-1), "seconds must be"),
-    "no tracks": (lambda d: d.update(tracks={}), "one or more"),
-    "track": (lambda d: d["tracks"].update(x={"sha256": "", "runs": []}), "track 'x'"),
-    "other track": (lambda d: d["tracks"][TRACK].update(sha256="0" * 64), "none of this version"),
-    "run twice": (lambda d: first_run(d, seed=721), "each level and seed once"),
-    "run of words": (lambda d: d["tracks"][TRACK]["runs"].__setitem__(0, "x"), "a run must have"),
-    "more in a run": (lambda d: first_run(d, more=1), "a run must have"),
-    "recording": (lambda d: first_run(d, recording="0"), "recording must be a SHA-256"),
-    "poses": (lambda d: first_run(d, poses=None), "poses must be a SHA-256"),
-    "outcome": (lambda d: first_run(d, outcome="won"), "outcome must be"),
-    "lost": (lambda d: first_run(d, lost=1), "lost must be"),
-    "error": (lambda d: first_run(d, ate_unaligned_m=-0.1), "ate_unaligned_m must be"),
-    "error of words": (lambda d: first_run(d, ate_unaligned_m="0"), "ate_unaligned_m must be"),
-    "share": (lambda d: first_run(d, silent_share=1.5), "silent_share must be"),
-    "huge scans": (lambda d: first_run(d, scans=HUGE), "scans must be"),
-    "huge seconds": (lambda d: d.update(seconds=HUGE), "seconds must be"),
-    "huge seed": (lambda d: d.update(seeds=[HUGE, 721]), "seeds must be"),
-    "huge seed of a run": (lambda d: first_run(d, seed=HUGE), "seed must be"),
-    "seed with a point": (lambda d: first_run(d, seed=720.0), "seed must be"),
-    "level of truth": (lambda d: first_run(d, level=False), "level must be"),
-    "level of a list": (lambda d: first_run(d, level=[0.0]), "level must be"),
-    "no error": (lambda d: first_run(d, ate_unaligned_m=None), "ate_unaligned_m must be a number"),
-    "no tracking": (lambda d: first_run(d, error_tracking_m=None), "error_tracking_m must be a n"),
-    "lost, finished": (lambda d: first_run(d, lost_at_s=3.0), "lost_at_s must be null where it"),
-    "never lost": (lambda d: first_run(d, outcome="lost", lost=1), "lost_at_s must be null where"),
-    "made_with of words": (lambda d: d.update(made_with="me"), "made_with must be an object"),
-    "made_with of pairs": (lambda d: d.update(made_with=[["a", 1]]), "made_with must be an obj"),
+    "schema": (lambda d: d.update(schema=2), "of schema 3"),
+    "what": (lambda d: d.update(what="a recipe"), "no results of the benchmark"),
+    "name": (lambda d: submitted(d, name="../x"), "name must be up to 40"),
+    "no name": (lambda d: submitted(d, name=""), "name must be a name"),
+    "slam": (lambda d: submitted(d, slam="a\nb"), "slam must be"),
+    "seconds": (lambda d: submitted(d, seconds=-1), "seconds must be"),
+    "huge seconds": (lambda d: submitted(d, seconds=HUGE), "seconds must be"),
+    "another SLAM's name": (lambda d: submitted(d, name="shunting"), "the name of another SLAM"),
+    "oracle": (lambda d: submitted(d, slam="oracle(ekf,movable)"), "an oracle is a control"),
+    "more": (lambda d: submitted(d, more=1), "no results"),
+    "no tracks": (lambda d: d.update(tracks={}, runs={}), "no runs"),
+    "no runs": (lambda d: d.update(runs={}), "each level and seed once"),
+    "track": (lambda d: d["tracks"].update(x=""), "track 'x'"),
+    "other track": (lambda d: d["tracks"].update({TRACK: "0" * 64}), "none of this version"),
     "tracks of a list": (lambda d: d.update(tracks=[1]), "tracks must be"),
-    "another SLAM's name": (lambda d: d.update(name="shunting"), "the name of another SLAM"),
-    "oracle": (lambda d: d.update(slam="oracle(ekf,movable)"), "an oracle is a control"),
+    "run of no track": (lambda d: moved(d, "x 0 720"), "a track without its hash"),
+    "run twice": (lambda d: moved(d, f"{TRACK} 0.0 721"), "a track without its hash"),
+    "seed of no track": (lambda d: moved(d, f"{TRACK} 0 {2**32}"), "seed must be"),
+    "level": (lambda d: moved(d, f"{TRACK} 0.3 720"), "level must be"),
+    "level of words": (lambda d: moved(d, f"{TRACK} x 720"), "no results"),
+    "run of words": (lambda d: d["runs"].update({KEY: "x"}), "no results"),
+    "fewer cells": (lambda d: d["runs"][KEY]["slams"]["mine"].pop(), "no results"),
+    "another's run": (lambda d: d["runs"][KEY]["slams"].clear(), "a run of another SLAM"),
+    "columns": (lambda d: d["columns"].reverse(), "columns must be poses"),
+    "recording": (lambda d: d["runs"][KEY].update(recording="0"), "recording must be a SHA-256"),
+    "poses": (lambda d: cell(d, "poses", None), "poses must be a SHA-256"),
+    "outcome": (lambda d: cell(d, "outcome", "won"), "outcome must be"),
+    "lost": (lambda d: cell(d, "lost", 1), "lost must be"),
+    "error": (lambda d: cell(d, "ate_unaligned_m", -0.1), "ate_unaligned_m must be"),
+    "error of words": (lambda d: cell(d, "ate_unaligned_m", "0"), "ate_unaligned_m must be"),
+    "no error": (lambda d: cell(d, "ate_unaligned_m", None), "ate_unaligned_m must be a number"),
+    "no tracking": (lambda d: cell(d, "error_tracking_m", None), "error_tracking_m must be a n"),
+    "share": (lambda d: cell(d, "silent_share", 1.5), "silent_share must be"),
+    "huge scans": (lambda d: cell(d, "scans", HUGE), "scans must be"),
+    "lost, finished": (lambda d: cell(d, "lost_at_s", 3.0), "lost_at_s must be null where it"),
+    "finished, lost": (lambda d: cell(d, "outcome", "lost"), "lost must be"),
+    "made_with of words": (lambda d: d.update(made_with="me"), "made_with must be an object"),
     "no made_with": (lambda d: d.pop("made_with"), "made_with"),
 }
 
 
 @pytest.mark.parametrize("what", WRONG)
 def test_what_is_wrong_is_named(file: Path, what: str):
-    data = json.loads(file.read_text())
     change, words = WRONG[what]
-    change(data)
-    data.pop("sha256")
-    data["sha256"] = submission._sha256(data)
-    file.write_text(json.dumps(data))
+    rewritten(file, change)
     with pytest.raises(LogFormatError, match=words) as told:
         submission.read(file)
     assert str(file) in str(told.value)
+
+
+def test_a_file_of_an_older_mobilia_is_refused_in_one_line(file: Path):
+    old = {"schema": 2, "what": "submission to the benchmark of mobilia", "tracks": {}}
+    file.write_text(json.dumps(old))
+    with pytest.raises(LogFormatError, match="another version of mobilia made it") as told:
+        submission.read(file)
+    assert "\n" not in str(told.value)
 
 
 def test_an_object_as_deep_as_can_be_read_is_refused(file: Path):
@@ -142,7 +164,7 @@ def test_an_object_as_deep_as_can_be_read_is_refused(file: Path):
         data = json.loads(text)
         try:
             data["made_with"] = json.loads(deep)
-            data["sha256"] = submission._sha256({k: v for k, v in data.items() if k != "sha256"})
+            data["sha256"] = runs_file._sha256({k: v for k, v in data.items() if k != "sha256"})
         except RecursionError:
             data["made_with"] = {}
         file.write_text(json.dumps(data).replace('"made_with": {}', f'"made_with": {deep}'))
@@ -151,10 +173,10 @@ def test_an_object_as_deep_as_can_be_read_is_refused(file: Path):
 
 
 def test_a_slam_may_be_submitted_by_its_own_name_only():
-    assert submission.checked_name("ekf", "ekf") == "ekf"
+    assert checked_name("ekf", "ekf") == "ekf"
     for slam in ("my_slam:MySlam", "ekf{x=1}", "shunting"):
         with pytest.raises(InvalidValueError, match="'ekf' is the name of another SLAM"):
-            submission.checked_name("ekf", slam)
+            checked_name("ekf", slam)
 
 
 def test_only_recordings_are_checked_and_only_by_the_machine_that_made_them(
@@ -206,11 +228,9 @@ def test_a_submission_of_an_older_world_is_read_but_its_scans_are_not_made_again
 def test_a_submission_that_says_another_world_than_its_tracks_is_refused(
     file: Path, by: int, kind: type[Exception]
 ):
-    data = json.loads(file.read_text())
-    data["world"] += by
-    data["sha256"] = submission._sha256({k: v for k, v in data.items() if k != "sha256"})
-    file.write_text(json.dumps(data))
-    with pytest.raises(kind, match=f"world.* {data['world']}"):
+    world = versions.WORLD + by
+    rewritten(file, lambda data: data.update(world=world))
+    with pytest.raises(kind, match=f"world.* {world}"):
         submission.read(file)
 
 
@@ -228,6 +248,7 @@ def test_only_what_is_alike_is_merged():
     with pytest.raises(InvalidValueError, match="of that name"):
         make._check_alike([made(), made()], Wanted(**plain), set())
     there = {(level, seed): f"{seed:064x}" for level in LEVELS for seed in (720, 721)}
-    assert len(make._on_the_same_scans(made(), TRACK, there)) == 10
+    assert len(made().rows(TRACK, there)) == 10
+    make._check_scans(made(), {TRACK: there})
     with pytest.raises(InvalidValueError, match=r"level 0\.5, seed 721 is of other scans"):
-        make._on_the_same_scans(made(), TRACK, there | {(0.5, 721): "f" * 64})
+        make._check_scans(made(), {TRACK: there | {(0.5, 721): "f" * 64}})

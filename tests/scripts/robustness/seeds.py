@@ -16,7 +16,7 @@ from PIL import Image
 from rosbags.rosbag1 import Writer as WriterOfRos1
 from rosbags.rosbag2 import StoragePlugin, Writer
 
-from scripts.benchmark import submission
+from scripts.benchmark import runs_file
 from sim.recording.dataset import Plan
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe, write_recipe
@@ -171,7 +171,7 @@ def results() -> dict[str, dict[str, str | bytes]]:
     with (folder / "map.npz").open("wb") as new:
         write_arrays(new, {**arrays, "header": np.array(json.dumps(words))})
     made_with = {"machine": {"processor": "an abacus", "cores": 2}}
-    submission.write(folder / "mine.json", replace(submitted(), made_with=made_with))
+    runs_file.write(folder / "mine.json", replace(submitted(), made_with=made_with))
     plan = Plan(
         recipe=Recipe(scene="arena", seed=1, dynamism=0.5, seconds=0.1),
         dynamisms=(0.5,),
