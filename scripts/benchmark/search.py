@@ -11,9 +11,10 @@ import argparse
 import json
 import sys
 import tempfile
+import tomllib
 import zlib
 from collections.abc import Mapping, Sequence
-from dataclasses import asdict, fields
+from dataclasses import fields
 from itertools import product
 from pathlib import Path
 from typing import Any
@@ -22,56 +23,23 @@ import numpy as np
 
 from scenes.crowd import Crowd
 from scripts.benchmark.scores import FAIR_M, TRACKING, Row
-from scripts.benchmark.tracks import DEPTH_CAMERA, GOOD_ODOMETRY, LEVELS, TRAIN, Track
-from scripts.comparison.entry import Entry
-from scripts.comparison.recording import load, record
+from scripts.benchmark.submission import alone, recorded
+from scripts.benchmark.tracks import LEVELS, TRAIN, Track
+from scripts.comparison.recording import load
 from scripts.console import ended
 from sim.core.versions import WORLD
 from slam.errors import InvalidValueError
 from slam.evaluation.statistics import quantile
 from slam.frames import BeamClass
-from slam.guests import Limits
 
-_ALONE: Mapping[str, tuple[Any, ...]] = {"motion": (1.0,), "change": (0.0,)}
 SHARE = 0.75  # of the training runs that must be lost: on fresh seeds it is less
 LEAST = 3  # runs that an error is judged by
 _CROWDS = tuple(each.name for each in fields(Crowd))
 _OF_TRACK = ("scene", "scanner", "odometry", "every", "seconds", "oracle")
-# By name: of each parameter of a track or of its top level the values that are tried; of what
-# "crowd." names, how many.
-SPACES: Mapping[str, Mapping[str, tuple[Any, ...]]] = {
-    "kidnaps": {
-        **_ALONE, "scene": ("apartment", "office", "warehouse"), "seconds": (90.0, 180.0),
-        "kidnap_every_s": (25.0, 30.0, 40.0), "crowd.escorts": (2, 4, 8),
-        "crowd.streams": (2, 4, 12), "n_chairs": (0, 10), "scanner": ("noise", DEPTH_CAMERA),
-        "odometry": (GOOD_ODOMETRY, "probabilistic_robotics"),
-    },
-    "boards": {
-        **_ALONE, "scene": ("gallery",), "seconds": (90.0,), "n_chairs": (0,),
-        "crowd.boards": (8, 12, 14), "crowd.escorts": (0, 2, 4, 6), "every": (8, 19),
-    },
-    "camera": {  # most of what a depth camera sees is who walks before it
-        **_ALONE, "scene": ("gallery", "station", "warehouse"), "scanner": (DEPTH_CAMERA,),
-        "odometry": (GOOD_ODOMETRY,), "seconds": (120.0,), "crowd.escorts": (0, 6, 10),
-        "crowd.streams": (0, 6, 20, 50), "crowd.boards": (0, 8), "crowd.trains": (0, 2, 4),
-        "crowd.beds": (0, 2, 4), "n_chairs": (0,),
-    },
-    "half-turn": {  # a room that is the same after half a turn
-        **_ALONE, "scene": ("arena",), "n_chairs": (0, 20), "moving_share": (1.0,),
-        "crowd.boards": (3, 4, 5), "crowd.escorts": (0, 4, 8), "every": (8, 19),
-    },
-    "no-walls": {
-        **_ALONE, "scene": ("arena",), "walls": ("none",), "n_chairs": (30, 40),
-        "moving_share": (0.0,), "crowd.escorts": (8, 10, 12), "crowd.boards": (1, 2),
-        "oracle": ("oracle(shunting,moving)",),
-    },
-    "changes": {  # what stands is out of range most of the time
-        "motion": (0.0,), "change": (1.0,), "scene": ("random-rooms",), "range_mode": ("8m",),
-        "size_m": (36.0, 40.0), "n_rooms": (2,),
-        "clutter": (0.0,), "n_chairs": (150, 250), "seconds": (90.0,),
-        "change_at_s": (None, 45.0), "odometry": (GOOD_ODOMETRY, "probabilistic_robotics"),
-    },
-}  # fmt: skip
+Space = Mapping[str, Sequence[Any]]
+SPACES: Mapping[str, Space] = tomllib.loads(
+    Path(__file__).with_suffix(".toml").read_text(encoding="utf-8")
+)
 
 
 def drawn(space: str, k: int) -> Track:
@@ -81,7 +49,7 @@ def drawn(space: str, k: int) -> Track:
     own = {name: told.pop(name) for name in _OF_TRACK if name in told}
     crowd = {n: told.pop(f"crowd.{n}") for n in _CROWDS if f"crowd.{n}" in told}
     told["crowd"] = ",".join(f"{name}:{n}" for name, n in crowd.items() if n) or "none"
-    sets = {"n_people": 0, **{name: value for name, value in told.items() if value is not None}}
+    sets = {"n_people": 0, **{name: value for name, value in told.items() if value != "never"}}
     return Track(
         name=f"{space}-{k + 1}-v1", about="", world=WORLD, axis="", **own,
         says=("",) * len(LEVELS), sets=(sets,) * len(LEVELS),
@@ -92,14 +60,10 @@ def tried(track: Track, level: float, seed: int, slam: str) -> Row:
     """One run: the row of the SLAM, and of the oracles where it was lost."""
     plan = track.plan((), (seed,), levels=(level,))
     with tempfile.TemporaryDirectory() as folder:
-        file = Path(folder) / "run.npz"
-        record(file, every=plan.every, **asdict(plan.recipe(plan.runs()[0])))
-        drive = load(file)
+        drive = load(recorded(plan, Path(folder)))
     rows: dict[str, Row] = {}
     for name in (slam, *track.oracles):
-        entry = Entry(name, drive, Limits(), judge_maps=False)
-        entry.over(drive.frames)
-        row = json.loads(entry.arrays()["row"])
+        row, _ = alone(name, drive)
         rows[name] = {key: row.get(key) for key in ("lost", TRACKING)}
         if not rows[slam]["lost"]:
             break

@@ -26,12 +26,6 @@ QUICK_LEVELS = (0.0, 0.5, 1.0)
 TRAIN = tuple(range(20))  # seeds to tune on; those that the SLAMs here were tuned on
 TEST = tuple(range(720, 740))  # seeds that count, of the first versions
 FRESH = tuple(range(906, 926))  # of what came after: nothing was run on them before it was frozen
-GOOD_ODOMETRY = "pioneer3dx"  # in large halls, where with the poor one even an oracle drifts
-# One row of a depth camera's picture: the field of view of a RealSense D435, the limits that ROS'
-# depthimage_to_laserscan has by default. Its error is one number here, and grows with the range.
-DEPTH_CAMERA = (
-    "scanner(fov_deg=87, beams=174, rate_hz=30, sigma_m=0.02, range_min_m=0.45, range_max_m=10)"
-)
 Sets = Mapping[str, Any]
 _NAME = re.compile(r"([a-z0-9]+(?:-[a-z0-9]+)*)-v([1-9][0-9]*)")
 
