@@ -100,12 +100,12 @@ def _files(path: Path) -> list[tuple[str, Path]]:
     )
 
 
-def try_names(slams: Iterable[str], scenes: Iterable[str], out: Path) -> None:
-    """Make each once: wrong names are told before anything starts. ``out``: hidden from SLAMs."""
+def try_names(slams: Iterable[str], scenes: Iterable[str]) -> None:
+    """Make each once: wrong names are told before anything starts."""
     for name in scenes:
         registry.build(name)
     for name in slams:
-        limited(name, Limits(hidden=(out,)))
+        limited(name, Limits())
 
 
 def run_jobs(

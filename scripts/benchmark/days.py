@@ -135,7 +135,7 @@ def carry_out(
     of: Buildings, out: Path, *, jobs: int = 1, cluster: str | None = None
 ) -> list[dict[str, Any]]:
     """The section alone, into a folder of its own; its rows."""
-    try_names(of.slams, (), out)
+    try_names(of.slams, ())
     out, settings = out.absolute(), head(of)
     with result_folder(out, COMMAND, settings) as written:
         rows = lives.carry_out(of, out / lives.DAYS, jobs=jobs, cluster=cluster)

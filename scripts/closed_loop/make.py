@@ -47,7 +47,7 @@ def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[Row]:
         if name not in built.goals:
             known = ", ".join(sorted(built.goals))
             raise UnknownNameError(f"scene '{plan.scene}' has no goal '{name}'. Known: {known}.")
-    try_names(plan.slams, (), out)
+    try_names(plan.slams, ())
     out = out.absolute()
     settings = {
         "drive_schema": SCHEMA, **asdict(plan), "lost_rule": LOST_RULE, "found_rule": FOUND_RULE,

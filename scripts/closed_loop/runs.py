@@ -34,7 +34,7 @@ def run_one(  # noqa: PLR0913 (the arguments of a job)
     """
     simulation = Simulation(scene, seed=seed, laser=laser, **room)
     try:
-        system = limited(slam, Limits(hidden=(path.parent.parent,)))
+        system = limited(slam, Limits())
     except SlamFailedError as error:
         save(path, _failed(goal_order(simulation.world, goals), error))
         return

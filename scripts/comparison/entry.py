@@ -17,7 +17,6 @@ from scripts.comparison.maps import MapJudge
 from scripts.comparison.recording import Recording, load
 from scripts.metrics import table
 from scripts.metrics.judged import Judged, lost_s
-from sim.recording.recipe import RECIPE
 from slam.errors import SlamFailedError
 from slam.evaluation import metrics
 from slam.frames import NS_PER_S, Float, Frame
@@ -110,16 +109,11 @@ def enter(
     """
     out = path.parent.parent
     drive = load(out / recording)
-    limits = Limits(scan_s=scan_limit_s, hidden=(whole_result(out),))
+    limits = Limits(scan_s=scan_limit_s)
     _warm_up(slam, drive.frames, limits)
     run = Entry(slam, drive, limits, judge_maps=judge_maps)
     run.over(drive.frames)
     np.savez_compressed(path, **run.arrays())
-
-
-def whole_result(out: Path) -> Path:
-    """The folder of results that ``out`` is of: a benchmark's, of one of its tracks."""
-    return out.parent if (out.parent / RECIPE).exists() else out
 
 
 def _warm_up(slam: str, frames: Sequence[Frame], limits: Limits) -> None:

@@ -11,7 +11,6 @@ from rich.table import Table
 
 from scripts.comparison import folder as files
 from scripts.comparison import tables
-from scripts.comparison.entry import whole_result
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.comparison.recording import load
 from scripts.comparison.run_file import merge
@@ -42,7 +41,7 @@ def carry_out(
     more  called as ``more(out, jobs=jobs, cluster=cluster)`` after the runs: what else is to be
           made in ``out``, and the tables of it (``scripts.days.buildings.beside``)
     """
-    try_names(plan.slams, plan.scenes, whole_result(out))
+    try_names(plan.slams, plan.scenes)
     if plan.sessions is not None and more is None:
         raise InvalidValueError("Plan.sessions needs more=scripts.days.buildings.beside(plan)")
     out = out.absolute()

@@ -11,7 +11,6 @@ from typing import Any
 
 import numpy as np
 
-from scripts.comparison.entry import whole_result
 from scripts.comparison.maps import NEAR_M, Believed, StaticDistance, clearance, seen_empty
 from scripts.comparison.recording import Recording
 from scripts.days import truth
@@ -299,7 +298,7 @@ def live(
     that fails, even at its start, is a row.
     """
     out = path.parent.parent
-    limits = Limits(scan_s=scan_limit_s, hidden=(whole_result(out),))
+    limits = Limits(scan_s=scan_limit_s)
     with tempfile.TemporaryDirectory() as folder:
         (building,) = started([slam], Path(folder), limits)
         rows, aged = lived([building], loaded([out / name for name in sessions]))

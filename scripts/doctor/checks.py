@@ -18,7 +18,6 @@ from packaging.requirements import Requirement
 import mobilia
 from sim.core.versions import WORLD
 from slam.errors import MissingDependencyError
-from slam.guests.confined import WHOLE, kernel_version
 
 State = Literal["ok", "can do without", "missing"]
 PACKAGE = "mobilia"
@@ -149,11 +148,6 @@ def _machine() -> Iterator[Finding]:
     told = str(folder) if writable else "cannot be written: each start compiles for a minute"
     how = "set NUMBA_CACHE_DIR to a folder that you may write"
     yield _usable("cache of compiled loops", writable, told, how)
-    landlock = kernel_version()
-    how = "Linux 5.13 or newer, with landlock in /sys/kernel/security/lsm"
-    told = f"version {landlock}" + ": it can empty files, not read them" * (landlock < WHOLE)
-    told = told if landlock else "a program behind pipe: sees all your files"
-    yield _usable("guests see no truth (Landlock)", landlock, told, how)
     free_gb = shutil.disk_usage(Path.cwd()).free / 1e9
     how = "outputs go to --out: name a folder on another disk"
     enough = free_gb >= LEAST_FREE_GB

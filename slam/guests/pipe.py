@@ -14,14 +14,12 @@ from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 from dataclasses import dataclass
 from functools import partial
-from pathlib import Path
 from typing import Any
 from weakref import ReferenceType, ref
 
 from slam.errors import InvalidValueError, SlamFailedError
 from slam.frames import Frame, LaserSpec
 from slam.guests import protocol
-from slam.guests.confined import rules
 from slam.guests.wire import Wire
 from slam.names import child_environment, join_folders, refuse_code
 from slam.oracle import Oracle
@@ -39,12 +37,10 @@ class Limits:
     scan_s   one scan
     first_s  its start, the first scan after it, a reset, the map and the final poses: compilers and
              great maps are no hang
-    hidden   folders of results, which hold the truth: a command sees nothing in them
     """
 
     scan_s: Positive = 10.0
     first_s: Positive = 120.0
-    hidden: tuple[Path, ...] = ()
 
     def __post_init__(self) -> None:
         check(self)
@@ -59,8 +55,6 @@ class PipeSlam:
     command      a line as a shell would split it (no shell runs it), or its words
     scan_limit_s, first_limit_s  see ``Limits``
     environment  of the command, None: ours
-    hidden  see ``Limits``
-    confined  whether it sees only what ``confined.rules`` lists, where the kernel can do that
 
     Raises ``InvalidValueError`` for a command that cannot be started, ``SlamFailedError`` with its
     outcome for everything that goes wrong behind it.
@@ -73,21 +67,15 @@ class PipeSlam:
         scan_limit_s: float = Limits.scan_s,
         first_limit_s: float = Limits.first_s,
         environment: dict[str, str] | None = None,
-        hidden: Sequence[Path] = (),
-        confined: bool = True,
     ) -> None:
-        self.limits = Limits(scan_s=scan_limit_s, first_s=first_limit_s, hidden=tuple(hidden))
+        self.limits = Limits(scan_s=scan_limit_s, first_s=first_limit_s)
         self._command = _words(command)
         self._environment = child_environment(guest=True) if environment is None else environment
-        self._confined = confined
         self._start()
 
     def _start(self) -> None:
-        seen = None
-        if self._confined:
-            seen = rules(self._command, self._environment, self.limits.hidden)
         bye = protocol.line({"type": "bye"})
-        self._wire = Wire(self._command, self._environment, farewell=bye, rules=seen)
+        self._wire = Wire(self._command, self._environment, farewell=bye)
         with self._over_if_it_fails():
             hello = protocol.line(protocol.hello_message())
             said = self._ask("hello", hello, self.limits.first_s)
@@ -220,7 +208,6 @@ def guarded(name: str, limits: Limits | None = None, **config: Any) -> PipeSlam:
             scan_limit_s=limits.scan_s,
             first_limit_s=limits.first_s,
             environment={**child_environment(guest=False), "PYTHONPATH": path},
-            confined=False,  # a class is ours as much as its own: it imports what we import
         )
     except SlamFailedError as error:
         where = f"SLAM '{name}' cannot be made:"
@@ -237,7 +224,5 @@ def limited(name: str, limits: Limits | None) -> SlamSystem:
         refuse_code(name, "SLAM")
         return Oracle(limited(wanted[0], limits), wanted[1])
     if name.startswith(COMMANDS):
-        return create(
-            name, scan_limit_s=limits.scan_s, first_limit_s=limits.first_s, hidden=limits.hidden
-        )
+        return create(name, scan_limit_s=limits.scan_s, first_limit_s=limits.first_s)
     return guarded(name, limits)

@@ -6,7 +6,6 @@ what it is used for.
 """
 
 import errno
-import marshal
 import os
 import resource
 import selectors
@@ -37,35 +36,27 @@ MARK = "MOBILIA_COMMAND"  # variable that worker processes of one command have i
 class Guard:
     """``command`` below a guard, to which its three streams belong.
 
-    rules  what it may see (``confined.rules``), None: all that we see
-
     Without a command it guards the processes with ``mark``, "name=value", in their environment.
     Raises ``OSError`` and ``ValueError`` as ``subprocess.Popen`` does.
     """
 
     def __init__(
-        self,
-        command: Sequence[str],
-        environment: Mapping[str, str],
-        mark: str = "",
-        rules: Sequence[tuple[str, int]] | None = None,
+        self, command: Sequence[str], environment: Mapping[str, str], mark: str = ""
     ) -> None:
-        encoded = [os.fsencode(word) for word in command]
-        variables = {os.fsencode(name): os.fsencode(value) for name, value in environment.items()}
-        if any(b"\0" in word for word in (*encoded, *variables, *variables.values())):
-            raise ValueError("embedded null byte")
         self._socket, its_end = socket.socketpair()
+        # Python adds one where there is no locale, which is not to be the guest's.
+        unset = "" if "LC_CTYPE" in environment else "LC_CTYPE"
+        words = [sys.executable, "-I", "-S", str(_SCRIPT), str(its_end.fileno())]
         with its_end, ExitStack() as if_it_fails:
             if_it_fails.callback(self._socket.close)
-            words = [sys.executable, "-I", "-S", str(_SCRIPT), str(its_end.fileno())]
             self.process = subprocess.Popen(
-                [*words, str(os.getpid())],
+                [*words, str(os.getpid()), mark, unset, *command],
                 stdin=subprocess.PIPE,
                 stdout=subprocess.PIPE,
                 stderr=subprocess.PIPE,
                 bufsize=0,
                 pass_fds=[its_end.fileno()],
-                env={name: value for name, value in os.environ.items() if name != MARK},
+                env={name: value for name, value in environment.items() if name != MARK},
                 start_new_session=True,  # what interrupts us at a terminal does not end it
             )
             if_it_fails.pop_all()
@@ -75,17 +66,13 @@ class Guard:
             os.set_blocking(stream.fileno(), False)
         self._status, self._words = "", bytearray()
         try:
-            seen = None if rules is None else [(os.fsencode(path), may) for path, may in rules]
-            told = (encoded, variables, os.fsencode(mark), seen)
-            self.pid = self._begin(marshal.dumps(told))
+            self.pid = self._begin()
         except BaseException:
             self.dismiss()
             raise
 
-    def _begin(self, told: bytes) -> int:
+    def _begin(self) -> int:
         self._socket.settimeout(_BEGIN_S)
-        with suppress(BrokenPipeError, ConnectionResetError):
-            self._socket.sendall(len(told).to_bytes(8, "little") + told)
         word, number = self._hear()
         if word == "errno":
             raise OSError(number, os.strerror(number))
@@ -148,11 +135,16 @@ class Guard:
         lines = self._words.decode(errors="replace").split("\n")
         return [text for line in lines if (text := " ".join(line.split()))]
 
+    def last_words(self) -> str:
+        """For the end of a message what it said last; "" where that is nothing."""
+        lines = self.said()
+        return f"; its last words: {_last(lines)!r}" if lines else ""
+
     def ended(self) -> str:
         """How it has ended, with its last words; "" where it lives. What it says is drained."""
         self.talk(b"", time.monotonic() + _DRAIN_S, self.keep)
         how = self.status()
-        return f"{how}; its last words: {_last(self.said())!r}" if how and self.said() else how
+        return f"{how}{self.last_words()}" if how else ""
 
     def status(self, within_s: float = 0.0) -> str:
         """How the guest has ended, in words, "" where it lives; it is waited for so long."""
@@ -194,14 +186,10 @@ class Guard:
             self.process.wait()
 
 
-def started(
-    command: Sequence[str],
-    environment: Mapping[str, str],
-    rules: Sequence[tuple[str, int]] | None = None,
-) -> Guard:
+def started(command: Sequence[str], environment: Mapping[str, str]) -> Guard:
     """A ``Guard``; raises ``InvalidValueError`` for a command that cannot be started."""
     try:
-        return Guard(command, environment, rules=rules)
+        return Guard(command, environment)
     except (OSError, ValueError) as error:
         why = getattr(error, "strerror", None) or error
         raise InvalidValueError(f"cannot start {command[0]!r}: {why}") from error
@@ -281,11 +269,8 @@ class Wire:
         command: Sequence[str],
         environment: Mapping[str, str] | None = None,
         farewell: bytes = b"",
-        rules: Sequence[tuple[str, int]] | None = None,
     ) -> None:
-        """``rules``: what it may see (``confined.rules``), None: all that we see."""
-        self._guard = started(command, os.environ if environment is None else environment, rules)
-        self._confined = rules is not None
+        self._guard = started(command, os.environ if environment is None else environment)
         self._finalizer = weakref.finalize(self, self._guard.dismiss, farewell, _LEAVE_S)
         self._heard = bytearray()
 
@@ -313,7 +298,7 @@ class Wire:
             deadline = time.monotonic() + limit_s
             there = b"\n" in self._heard
             if not there and not self._guard.talk(request, deadline, self._hear):
-                why = f"hung: no answer within {limit_s:g} s{self._last_words()}"
+                why = f"hung: no answer within {limit_s:g} s{self._guard.last_words()}"
                 raise SlamFailedError(why, "hung")
         except BaseException:
             if self._finalizer.detach():
@@ -331,19 +316,11 @@ class Wire:
         if not data:
             status = self._guard.status(_STATUS_S)
             how = f"its process {status}" if status else "closed its standard output"
-            raise SlamFailedError(f"{how}{self._last_words()}")
+            raise SlamFailedError(f"{how}{self._guard.last_words()}")
         self._heard += data
         if len(self._heard) > MAX_LINE_BYTES:
             raise SlamFailedError(f"answered a line of more than {MAX_LINE_BYTES} bytes", "bad")
         return b"\n" in data
-
-    def _last_words(self) -> str:
-        said = self._guard.said()
-        refused = any(why in " ".join(said) for why in ("Permission denied", "No module named"))
-        hint = ""
-        if self._confined and refused:
-            hint = "; it sees only its own folder: docs/bring_your_own.md"
-        return f"; its last words: {_last(said)!r}{hint}" if said else ""
 
     def processor_s(self) -> float | None:
         """Processor time it has used, all its threads, s; None where that cannot be known."""

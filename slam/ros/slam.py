@@ -107,7 +107,6 @@ class Ros2Slam(OnPath):
     command  words as a shell would split them (no shell runs it), "" for a node that runs already
     scan_limit_s   of silence, wall clock: then the node counts as hung
     first_limit_s  until it listens to /scan, and until its first answer
-    hidden   as of ``slam.guests.Limits``; a node sees all our files
 
     Raises ``InvalidValueError`` for a command that cannot be started, ``MissingDependencyError``
     without the extra, ``SlamFailedError`` with its outcome for what goes wrong on the other side.
@@ -122,9 +121,8 @@ class Ros2Slam(OnPath):
         *,
         scan_limit_s: float = Limits.scan_s,
         first_limit_s: float = Limits.first_s,
-        hidden: Sequence[Path] = (),
     ) -> None:
-        self._limits = Limits(scan_s=scan_limit_s, first_s=first_limit_s, hidden=tuple(hidden))
+        self._limits = Limits(scan_s=scan_limit_s, first_s=first_limit_s)
         try:
             self._command = shlex.split(command)
         except ValueError as error:

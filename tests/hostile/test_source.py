@@ -36,10 +36,9 @@ IMPORTERS = {
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
     "sim/gym/workers.py": ["pickle"],  # settings and functions of who makes the rooms
-    "slam/guests/guard.py": ["marshal"],
-    "slam/guests/wire.py": ["marshal"],
 }
 STARTERS = {
+    "slam/guests/guard.py": "pipe:COMMAND, as wire.py says it",
     "slam/guests/wire.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
     "sim/gym/workers.py": "our own Python, which steps some of the rooms",
     "sim/view/gl.py": "our own Python, without the working folder",
