@@ -11,7 +11,7 @@ from numpy.typing import NDArray
 from slam.errors import InvalidValueError, NeedsLabelsError, NotFiniteError, SlamFailedError
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame
-from slam.system import HasChanges, HasLandmarks, RunsAtTheEnd, SlamSystem, told
+from slam.interface import HasChanges, HasLandmarks, RunsAtTheEnd, SlamSystem, told
 from slam.trajectory import Trajectory
 
 T = TypeVar("T")

@@ -4,13 +4,12 @@
 import numpy as np
 
 from slam import se2
+from slam.estimate import Estimate
 from slam.frames import Float, Frame, Odometry
 from slam.frontend import odometry_prior
 from slam.path import OnPath, PosePath
-from slam.system import Estimate, register
 
 
-@register("odometry")
 class OdometrySlam(OnPath):
     """Chains odometry from the first frame; no map.
 

@@ -16,8 +16,8 @@ from numpy.typing import NDArray
 from slam.errors import NeedsLabelsError
 from slam.estimate import Estimate, Raster
 from slam.frames import BeamClass, Frame, Scan
+from slam.interface import SlamSystem
 from slam.shaped import one_of
-from slam.system import SlamSystem
 from slam.trajectory import Trajectory
 from slam.variants import ORACLE, TAKEN_OUT
 
@@ -26,7 +26,7 @@ KINDS = {
     "moving": (BeamClass.MOVING,),
 }
 OPTIONAL = (
-    # the optional protocols of ``slam.system``
+    # the optional protocols of ``slam.interface``
     "landmarks", "changes", "save", "cells_hold", "poses_in_map",
     "estimates_at_end",  # of a program over files
     "processor_s", "memory_growth_bytes",  # of a system in a process of its own

@@ -22,17 +22,17 @@ from slam.constant_velocity import ConstantVelocity
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError
 from slam.estimate import Changes, Estimate, Landmarks, Raster
 from slam.frames import Float, Frame, Stream
-from slam.oracle import shown
-from slam.system import (
+from slam.interface import (
     CanSave,
     HasChanges,
     HasLandmarks,
     RunsAtTheEnd,
     SaysCells,
     SlamSystem,
-    create,
     told,
 )
+from slam.oracle import shown
+from slam.system import create
 from slam.trajectory import Trajectory
 
 __all__ = ["Replay", "Track", "primary_of", "systems_named"]

@@ -1,15 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What a SLAM is to this project: a protocol of four methods, and the names it can be asked for by.
-
-    class MySlam:
-        def reset(self) -> None: ...
-        def update(self, frame: Frame) -> Estimate: ...
-        def map(self) -> Raster | None: ...
-        def trajectory(self) -> Trajectory: ...
-
-A SLAM may have more: ``HasLandmarks``, ``HasChanges``, ``CanSave``, ``SaysCells`` and
-``RunsAtTheEnd`` are optional.
-Who wants one of these asks whether it is there (``slam.replay.Track``), never for a class.
+"""The names that a SLAM (``slam.interface``) can be asked for by.
 
 ``create("shunting")`` makes a registered one, ``create("my_package.my_module:MySlam")`` any class,
 ``create("pipe:./my_slam --option")`` a program in any language (``slam.guests.pipe``),
@@ -19,100 +9,35 @@ Who wants one of these asks whether it is there (``slam.replay.Track``), never f
 ``create("oracle(map)")`` is shown the true map instead (``slam.oracle_map``).
 """
 
-import importlib
 import inspect
-import os
-import sysconfig
-import traceback
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Callable, Mapping
 from functools import partial
-from pathlib import Path
-from typing import Any, Protocol, TypeVar, runtime_checkable
+from importlib import import_module
+from typing import Any, TypeVar
 
 from slam.errors import InvalidValueError, MobiliaError, SlamFailedError, UnknownNameError, meant
 from slam.estimate import Changes, Estimate, Landmarks, Raster
-from slam.frames import Float, Frame
+from slam.interface import (
+    CanSave,
+    HasChanges,
+    HasLandmarks,
+    MovingMap,
+    RunsAtTheEnd,
+    SaysCells,
+    SlamSystem,
+    refuse_at_the_end,
+    told,
+)
 from slam.names import first_line, join_folders, refuse_code
+from slam.oracle import Oracle
 from slam.settings import Settings
-from slam.trajectory import Trajectory
 from slam.variants import MAP_ORACLE, inside, oracle_of, parsed
 
 __all__ = [
-    "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "Raster",
-    "RunsAtTheEnd", "SaysCells", "SlamSystem", "config_of", "create", "describe", "names",
+    "CanSave", "Changes", "Estimate", "HasChanges", "HasLandmarks", "Landmarks", "MovingMap",
+    "Raster", "RunsAtTheEnd", "SaysCells", "SlamSystem", "config_of", "create", "describe", "names",
     "refuse_at_the_end", "register", "register_prefix", "told",
 ]  # fmt: skip
-
-
-_FOLDERS = (*map(sysconfig.get_path, ("stdlib", "purelib", "platlib")), str(Path(__file__).parent))
-_LIBRARIES = ("<frozen ", *(folder + os.sep for folder in _FOLDERS))
-
-
-@runtime_checkable
-class SlamSystem(Protocol):
-    """One SLAM. ``update`` gets frames in the order of their stamps, the first at the origin."""
-
-    def reset(self) -> None:
-        """Forget everything; the next frame is the first."""
-
-    def update(self, frame: Frame) -> Estimate:
-        """Take a frame in, say where the robot is. Must not read ``frame.truth`` or ``labels``."""
-
-    def map(self) -> Raster | None:
-        """The map now, or None for a system without one."""
-
-    def trajectory(self) -> Trajectory:
-        """Final poses of all frames so far; the online ones where nothing better exists."""
-
-
-@runtime_checkable
-class HasLandmarks(Protocol):
-    """Optional: a map of points. The film draws its ellipses, the paper's figures count them."""
-
-    def landmarks(self) -> Landmarks:
-        """The landmarks now."""
-
-
-@runtime_checkable
-class HasChanges(Protocol):
-    """Optional: a map that knows what moved. A run draws it as ``changes.png``."""
-
-    def changes(self) -> Changes | None:
-        """What appeared and what is gone lately, None where nothing can be said."""
-
-
-@runtime_checkable
-class CanSave(Protocol):
-    """Optional: a map that can be kept. A run writes it as ``map.npz``."""
-
-    def save(self, path: Path) -> None:
-        """Write the map; raises ``OutputError``."""
-
-
-@runtime_checkable
-class MovingMap(Protocol):
-    """Optional: a map that closed loops move. ``diagnostics["correction"]`` is not zero then."""
-
-    def poses_in_map(self) -> Float:
-        """(n, 3) of all frames so far in the map as it is now."""
-
-
-@runtime_checkable
-class SaysCells(Protocol):
-    """Optional: what the cells of ``map()`` hold, for titles: "probabilities", "activities"."""
-
-    cells_hold: str
-
-
-@runtime_checkable
-class RunsAtTheEnd(Protocol):
-    """Optional: a program over files. ``update`` reports odometry's pose until the last frame."""
-
-    def estimates_at_end(self) -> Sequence[tuple[Estimate, float]]:
-        """Of each frame so far, in order: the estimate, and the processor time it took, s.
-
-        Each estimate must be of its frame and those before it: it is scored as an online one.
-        """
 
 
 Factory = Callable[..., object]
@@ -176,10 +101,14 @@ def names() -> list[str]:
 def _registered(name: str) -> Factory | None:
     """The factory of that name; None where nothing is registered under it."""
     if name not in _registry and name in OWN:
-        module, _, attribute = OWN[name].partition(":")
-        own: Factory = getattr(importlib.import_module(module), attribute)
-        return own
+        return _own(OWN[name])
     return _registry.get(name)
+
+
+def _own(entry: str) -> Factory:
+    module, _, attribute = entry.partition(":")
+    own: Factory = getattr(import_module(module), attribute)
+    return own
 
 
 def describe(name: str) -> str:
@@ -228,13 +157,11 @@ def create(name: str, **config: Any) -> SlamSystem:
     """
     refuse_code(name, "SLAM")
     if name == MAP_ORACLE:
-        by_map: SlamSystem = importlib.import_module("slam.oracle_map").MapOracle()
-        return by_map
+        from slam.oracle_map import MapOracle  # it loads a compiler
+
+        return MapOracle()
     if (wanted := oracle_of(name)) is not None:
-        oracle: SlamSystem = importlib.import_module("slam.oracle").Oracle(
-            create(wanted[0], **config), wanted[1]
-        )
-        return oracle
+        return Oracle(create(wanted[0], **config), wanted[1])
     name, changes = parsed(name)
     if changes:
         if "config" in config:
@@ -262,39 +189,16 @@ def _factory(name: str) -> Factory:
     """What makes the SLAM of that name: behind a prefix, in a module, or registered."""
     start, colon, rest = name.partition(":")
     prefix = f"{start}:"
-    if prefix in OWN_PREFIXES:  # a module that registers itself
-        importlib.import_module(OWN_PREFIXES[prefix].partition(":")[0])
     if prefix in _prefixes:
         return partial(_prefixes[prefix], rest)
+    if prefix in OWN_PREFIXES:
+        return partial(_own(OWN_PREFIXES[prefix]), rest)
     if colon:
         return _load(name)
     check_name(name)
     registered = _registered(name)
     assert registered is not None
     return registered
-
-
-def refuse_at_the_end(system: object, name: str, what: str) -> None:
-    """``InvalidValueError`` for a SLAM that runs at the end, where ``what`` needs poses before."""
-    if isinstance(system, RunsAtTheEnd):
-        raise InvalidValueError(
-            f"SLAM '{name}' is a program over files: it has no pose before the last scan, "
-            f"and {what} needs one at every scan"
-        )
-
-
-def told(error: BaseException) -> str:
-    """An exception of somebody else's code in one line: type, words, and their last line in it.
-
-    That is the last line outside Python's library, installed packages and this one, if there is
-    any: where their code called NumPy, not the line of NumPy that raised.
-    """
-    words = str(error).strip().partition("\n")[0]
-    what = f"{type(error).__name__}: {words}" if words else type(error).__name__
-    trace = traceback.extract_tb(error.__traceback__)
-    theirs = [at for at in trace if not at.filename.startswith(_LIBRARIES)] or trace
-    where = f" ({Path(theirs[-1].filename).name}:{theirs[-1].lineno})" if theirs else ""
-    return what + where
 
 
 def _check_options(name: str, factory: Factory, config: Mapping[str, Any]) -> None:
@@ -314,7 +218,7 @@ def _load(entry: str) -> Factory:
     module_name, _, attribute = entry.partition(":")
     join_folders()
     try:
-        module = importlib.import_module(module_name)
+        module = import_module(module_name)
     except (ImportError, TypeError, ValueError) as error:  # the last two: no proper module name
         raise UnknownNameError(f"'{entry}': cannot import '{module_name}' ({error})") from error
     except Exception as error:

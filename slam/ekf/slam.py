@@ -30,7 +30,6 @@ from slam.frontend.polar import hidden, polar
 from slam.landmarks.association import METHODS
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
 from slam.path import OnPath, PosePath
-from slam.system import register
 
 CHANCE = 0.05  # probability of something else where a landmark was; set by hand
 WITHIN = 0.95  # share of range and field of view: surely in view
@@ -156,7 +155,6 @@ class _Pairs:
         return int((self.landmarks >= 0).sum())
 
 
-@register("ekf")
 class EkfSlam(OnPath):
     """EKF-SLAM on point landmarks: IPJC association, landmarks that are confirmed and deleted.
 

@@ -14,10 +14,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import njit
+from slam.estimate import Raster
 from slam.frames import Float
 from slam.frontend.visibility import View, free_around, seen_empty
 from slam.settings import Settings, number
-from slam.system import Raster, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
     FREE_COUNT,
@@ -260,7 +260,6 @@ class Grid(CellMap):
         return self.raster(values, extent, n)
 
 
-@register("occupancy")
 class OccupancySlam(Tracker):
     """An ordinary log-odds occupancy grid, with the matcher of every tracker."""
 

@@ -20,7 +20,6 @@ import numpy as np
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, flattened, lifted, needed, stacked, voxel_m
-from slam.system import register
 
 
 @contextmanager
@@ -60,7 +59,6 @@ ITERATIONS = 100  # its default
 CONVERGED = 1e-3  # m and rad, of a step; 1e-4 takes twice as long and is no better
 
 
-@register("genz-icp")
 class GenzIcpSlam(Guest):
     """GenZ-ICP, a guest: ICP that weighs planes and points, with odometry as its guess."""
 

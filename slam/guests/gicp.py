@@ -14,7 +14,6 @@ from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, flattened, lifted, moved_on, nearest, needed, stacked
-from slam.system import register
 
 CELL_M = 0.05  # m; one point in each such cell
 APART_M = 0.1  # m between the three layers
@@ -23,7 +22,6 @@ REACH_M = 0.15  # points farther apart are no pair; 0.25 and 0.5 m are pulled al
 ITERATIONS = 30
 
 
-@register("small-gicp")
 class SmallGicpSlam(Guest):
     """small_gicp's matcher, a guest: generalised ICP to nearby kept scans, no graph."""
 

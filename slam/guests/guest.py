@@ -18,12 +18,13 @@ from slam.errors import (
     MobiliaError,
     SlamFailedError,
 )
+from slam.estimate import Estimate
 from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction, predict
+from slam.interface import told
 from slam.path import OnPath, PosePath
-from slam.system import Estimate, told
 
 SPACING_AT_M = 10.0  # m; there a voxel is as wide as two beams are apart
 LEAST_VOXEL_M = 0.10  # m

@@ -15,7 +15,6 @@ from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import NOTHING_M, Guest, check_beams, moved_on, nearest, needed, ranges_of
-from slam.system import register
 
 RANGE_M = 20.0
 FINE_RAD = math.radians(0.1)
@@ -24,7 +23,6 @@ WIDE = (1.2, 0.5)  # the same, where the narrow search does poorly
 POOR = 0.35  # Karto's response, of 1; its own least for a loop
 
 
-@register("karto")
 class KartoSlam(Guest):
     """Karto's scan matcher, a guest: correlative matching to nearby kept scans, no graph."""
 

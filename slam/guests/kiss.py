@@ -13,13 +13,11 @@ import numpy as np
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, flattened, lifted, needed, voxel_m
-from slam.system import register
 
 MAP_M = 100.0  # structure farther from the robot is dropped from its map
 FIRST_M, STILL_M = 0.3, 0.02  # correspondence threshold at the start; motion below it is not learnt
 
 
-@register("kiss-icp")
 class KissIcpSlam(Guest):
     """KISS-ICP, a guest: point-to-point ICP on a voxel map, with odometry as its guess."""
 

@@ -26,7 +26,6 @@ from slam.frontend.odometry_prior import Prediction
 from slam.guests import wire
 from slam.guests.guest import Guest, check_beams, ranges_of
 from slam.guests.pipe import Limits
-from slam.system import register
 from slam.trajectory import Trajectory
 
 EPOCH_100NS = 116_444_736_000_000_000  # MRPT's time is 100 ns since 1601: here 1970-01-01
@@ -220,7 +219,6 @@ class MrptSlam(Guest):
         return Estimate(stamp_ns=stamp_ns, T_map_robot=T_map_robot, covariance=np.zeros((3, 3)))
 
 
-@register("icp-slam")
 class IcpSlam(MrptSlam):
     """MRPT's icp-slam, a guest over files: ICP to a map of points, run when the last scan is in.
 
@@ -241,7 +239,6 @@ class IcpSlam(MrptSlam):
     )  # fmt: skip
 
 
-@register("rbpf-slam")
 class RbpfSlam(MrptSlam):
     """MRPT's rbpf-slam, a guest over files: particles with grids, run when the last scan is in.
 

@@ -18,14 +18,16 @@ from typing import Any
 from weakref import ReferenceType, ref
 
 from slam.errors import InvalidValueError, SlamFailedError
+from slam.estimate import Estimate, Raster
 from slam.frames import Frame, LaserSpec
 from slam.guests import protocol
 from slam.guests.wire import Wire
+from slam.interface import SlamSystem
 from slam.names import child_environment, join_folders, refuse_code
 from slam.oracle import Oracle
 from slam.path import PosePath
 from slam.shaped import Positive, check
-from slam.system import Estimate, Raster, SlamSystem, create, register_prefix
+from slam.system import create
 from slam.trajectory import Trajectory
 from slam.variants import COMMANDS, PIPE, oracle_of
 
@@ -46,7 +48,6 @@ class Limits:
         check(self)
 
 
-@register_prefix(PIPE)
 class PipeSlam:
     """The system behind a command. After a failure it is over; ``reset`` starts it again.
 

@@ -16,8 +16,9 @@ from slam.answers import asked, asked_at_end, asked_map, asked_trajectory, judge
 from slam.errors import MobiliaError, SlamFailedError
 from slam.frames import LaserSpec
 from slam.guests import protocol
+from slam.interface import RunsAtTheEnd, SlamSystem, told
 from slam.names import OURS, SAFE_PATH, look_in
-from slam.system import RunsAtTheEnd, SlamSystem, create, told
+from slam.system import create
 
 
 class Server:

@@ -78,7 +78,6 @@ class Guard:
             raise OSError(number, os.strerror(number))
         if word != "pid":
             raise OSError(errno.ECHILD, "its guard did not start")
-        self._socket.setblocking(False)
         return number
 
     def _hear(self) -> tuple[str, int]:
@@ -96,29 +95,25 @@ class Guard:
         ``heard`` gets 1 or 2, for standard output or error, and the bytes, none at its end. False
         when the time (monotonic, s) is up before.
         """
-        stdin, *outputs = self._streams
-        left = memoryview(unsent)
+        left: bytes | memoryview = memoryview(unsent)
         with selectors.DefaultSelector() as selector:
-            for number, stream in enumerate(outputs, start=1):
-                selector.register(stream, selectors.EVENT_READ, number)
-            if left:
-                selector.register(stdin, selectors.EVENT_WRITE, 0)
-            more: bytes | memoryview
+            for number, stream in enumerate(self._streams):
+                if number or left:
+                    way = selectors.EVENT_READ if number else selectors.EVENT_WRITE
+                    selector.register(stream, way, number)
             while selector.get_map():
                 if (left_s := deadline - time.monotonic()) <= 0.0:
                     return False
                 for key, _ in selector.select(left_s):
-                    try:
+                    with suppress(BlockingIOError):
                         if key.data:
-                            more = os.read(key.fd, _CHUNK)
+                            more: bytes | memoryview = os.read(key.fd, _CHUNK)
                             if heard(key.data, more):
                                 return True
                         else:
                             more = left = left[_written(key.fd, left) :]
-                    except BlockingIOError:
-                        continue
-                    if not more:
-                        selector.unregister(key.fileobj)
+                        if not more:
+                            selector.unregister(key.fileobj)
         return True
 
     def keep(self, _stream: int, data: bytes) -> bool:
@@ -148,14 +143,11 @@ class Guard:
 
     def status(self, within_s: float = 0.0) -> str:
         """How the guest has ended, in words, "" where it lives; it is waited for so long."""
-        deadline = time.monotonic() + within_s
-        while True:
-            with suppress(BlockingIOError):
-                if not self._status:
-                    self._status = _in_words(*self._hear())
-            if self._status or time.monotonic() >= deadline:
-                return self._status
-            time.sleep(0.005)
+        if not self._status:
+            self._socket.settimeout(max(within_s, 0.0))
+            with suppress(BlockingIOError, TimeoutError):
+                self._status = _in_words(*self._hear())
+        return self._status
 
     def end_input(self) -> None:
         """The guest has heard all."""
@@ -227,7 +219,7 @@ def guarded_workers() -> Iterator[None]:
         yield
         return
     before = os.environ.get(MARK)  # of a worker that has workers
-    os.environ[MARK] = _workers_guard(os.getpid())
+    os.environ[MARK] = _workers_guard(os.getpid())[0]
     try:
         yield
     finally:
@@ -236,16 +228,13 @@ def guarded_workers() -> Iterator[None]:
             os.environ[MARK] = before
 
 
-_workers_guards: dict[str, Guard] = {}  # they end with this process
-
-
 @cache
-def _workers_guard(_process: int) -> str:
-    """The mark; one for each process, as workers stay for the next call."""
+def _workers_guard(_process: int) -> tuple[str, Guard]:
+    """The mark, and who ends with this process; one for each, as workers stay for the next call."""
     value = uuid.uuid4().hex
-    _workers_guards[value] = Guard((), {}, f"{MARK}={value}")
-    _workers_guards[value].hush()
-    return value
+    guard = Guard((), os.environ, f"{MARK}={value}")
+    guard.hush()
+    return value, guard
 
 
 MAX_LINE_BYTES = 1 << 28  # a map of 5000 x 5000 cells with all digits of a float32

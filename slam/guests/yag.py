@@ -16,7 +16,6 @@ from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import KEEP_M, NOTHING_M, Guest, check_beams, moved_on, needed, ranges_of
-from slam.system import register
 from slam.trajectory import Trajectory
 
 BUFFER = 20  # latest vertices matched against
@@ -38,7 +37,6 @@ def _pose(transform: Any) -> Float:
     return np.array([transform.x, transform.y, transform.euler[-1]])
 
 
-@register("yag-slam")
 class YagSlam(Guest):
     """YAG SLAM, a guest: Karto's matcher with a pose graph and closed loops."""
 

@@ -33,7 +33,6 @@ from slam.ros.messages import MAP, ODOM
 from slam.ros.node import Node
 from slam.ros.robot import Robot
 from slam.ros.template import said_ns
-from slam.system import register_prefix
 
 ROUTER = 7447  # port of rmw_zenohd
 LEASE_S = 15.0  # s; DDS takes an ended node for alive for 10 s, and a scan sent meanwhile is lost
@@ -100,7 +99,6 @@ SETTLE_S = 0.5  # from our finding the node to its finding us: what is sent befo
 ANSWER_S = 1.0  # that a scan's answer is waited for, wall clock: a node may skip scans
 
 
-@register_prefix("ros2:")
 class Ros2Slam(OnPath):
     """A ROS 2 node over DDS: the one that is there, or that a command starts.
 
@@ -174,7 +172,6 @@ class Ros2Slam(OnPath):
             self._other = None
 
 
-@register_prefix("ros2-zenoh:")
 class Ros2ZenohSlam(Ros2Slam):
     """A ROS 2 node over Zenoh (``rmw_zenoh_cpp``), the same way."""
 

@@ -26,6 +26,7 @@ from numpy.typing import NDArray
 
 from slam import se2
 from slam.errors import InvalidValueError
+from slam.estimate import Estimate
 from slam.frames import Float, Frame
 from slam.frontend.corners import corners
 from slam.frontend.observations import Observations
@@ -34,7 +35,6 @@ from slam.landmarks.association import ipjc
 from slam.landmarks.filter import EkfFilter
 from slam.shunting.map.peaks import Peaks, peaks
 from slam.shunting.slam import ShuntingConfig, ShuntingSlam
-from slam.system import Estimate, register
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.matcher import Match, seen_by
 from slam.tracker.matching.score import evaluate
@@ -58,7 +58,6 @@ class _Agreed:
     information: Float
 
 
-@register("shunting-features")
 class FeaturedShuntingSlam(ShuntingSlam):
     """The shunting SLAM on point features (corners of scans), associated by IPJC.
 

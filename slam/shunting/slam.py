@@ -6,7 +6,6 @@ from typing import ClassVar
 
 from slam.estimate import Changes, Raster
 from slam.shunting.map import export
-from slam.system import register
 from slam.tracker.config import TrackerConfig
 from slam.tracker.network import Network
 from slam.tracker.tracker import Tracker
@@ -17,7 +16,6 @@ class ShuntingConfig(TrackerConfig):
     """As ``TrackerConfig``; ``robust()`` is the default, ``paper()`` the paper as printed."""
 
 
-@register("shunting")
 class ShuntingSlam(Tracker):
     """Localise on the network, then let the network see the frame (Eqs. 8 and 13).
 

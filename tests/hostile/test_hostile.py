@@ -24,7 +24,6 @@ from sim.simulation import Simulation
 from sim.view import gl
 from slam import create
 from slam.errors import InvalidValueError, LogFormatError, UntrustedNameError
-from slam.guests.confined import MORE
 from slam.maps import read_map
 from slam.names import NameFromFile
 from slam.shunting import ShuntingSlam
@@ -130,7 +129,6 @@ def episode(tmp_path_factory: pytest.TempPathFactory) -> Path:
 def hostile(tmp_path: Path, episode: Path, monkeypatch) -> Iterator[Hostile]:
     (tmp_path / "ran").mkdir()
     monkeypatch.setattr(sys, "path", [*sys.path])
-    monkeypatch.setenv(MORE, str(tmp_path / "ran"))  # else a command could not tell that it ran
     folder = Hostile(tmp_path / "theirs", tmp_path / "ran", episode)
     monkeypatch.chdir(folder.path)
     yield folder
