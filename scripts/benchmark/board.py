@@ -66,7 +66,7 @@ class Board:
         """One for each track and SLAM."""
         return [row for _, rows in self._scores.values() for row in rows]
 
-    @property
+    @cached_property
     def slams(self) -> list[str]:
         """The subject first, the controls last."""
         named = list(dict.fromkeys(row["slam"] for row in self.rows))
@@ -75,8 +75,11 @@ class Board:
 
     def row(self, track: str, slam: str) -> Row | None:
         """Of the leaderboard; None where that SLAM was not on that track."""
-        found = (row for row in self.rows if (row["track"], row["slam"]) == (track, slam))
-        return next(found, None)
+        return next((row for row in self._scores[track][1] if row["slam"] == slam), None)
+
+    def of(self, slam: str) -> list[Row]:
+        """Its rows, track by track."""
+        return [row for row in self.rows if row["slam"] == slam]
 
     def failures(self) -> list[str]:
         """One line for each SLAM and track where it raised, hung or answered nonsense."""
@@ -122,13 +125,11 @@ class Board:
 
     def said(self) -> list[str]:
         """What the reader asked: whether the subject is lost, where, and which place it has."""
-        every = self._of(self.subject)
-        few = min((row["seeds"] for row in every), default=0)
+        every = self.of(self.subject)
         over = [self._over_all(), self._place()] if self._counting else self._each_track()
-        if few < LEAST_RUNS:
-            where = [self._lost_where()] if self._counting else []
+        if min((row["seeds"] for row in every), default=0) < LEAST_RUNS:
             more = f"Track by track it takes `--seeds {LEAST_RUNS}` to tell from which level on."
-            return [*filter(None, [*over, *where]), more]
+            return [*filter(None, [*over, self._lost_where()]), more]
         return [*filter(None, over), *self._by_track(every)]
 
     def _over_all(self) -> str:
@@ -267,7 +268,7 @@ class Board:
         lines = [f"- {key}: {value}" for key, value in self.head.items() if key in _SHOWN]
         lines.append(f"- to cite: {self.cite()}")
         lines += [f"- not installed: `{name}` ({why})" for name, why in self.missing.items()]
-        silent = [s for s in self.slams if all(row[SILENT] is None for row in self._of(s))]
+        silent = [s for s in self.slams if all(row[SILENT] is None for row in self.of(s))]
         if silent:
             named = ", ".join(f"`{name}`" for name in silent)
             lines.append(f"- no silent failures can be counted without a covariance: {named}")
@@ -278,9 +279,6 @@ class Board:
             for name, one in self.merged.items()
         ]
         return ["\n".join(lines)]
-
-    def _of(self, slam: str) -> list[Row]:
-        return [row for row in self.rows if row["slam"] == slam]
 
     def _section(self, track: Track) -> list[str]:
         fair = self.fair[track.name]
