@@ -8,7 +8,7 @@ from typing import Any
 
 from scripts.benchmark import days, published, runs_file, submission
 from scripts.benchmark.board import Board
-from scripts.benchmark.runs_file import At, Digests, Results, checked_name
+from scripts.benchmark.runs_file import Digests, Made, Results, checked_name
 from scripts.benchmark.tracks import LEVELS, QUICK_LEVELS, TEST, TRACKS, TRAIN, Track
 from scripts.comparison.folder import Compared
 from scripts.comparison.make import carry_out as compare
@@ -16,7 +16,6 @@ from scripts.comparison.plan import Plan
 from scripts.console import note
 from scripts.days.buildings import DAYS, Buildings
 from scripts.days.buildings import carry_out as live
-from scripts.days.scores import Row
 from scripts.machine import machine, versions
 from scripts.output import result_folder
 from sim.core.versions import WORLD
@@ -198,7 +197,9 @@ def _tell_of_others(shared: Results, digests: Mapping[str, Digests]) -> None:
         )
 
 
-def _board(wanted: Wanted, runs: Runs, merge: Sequence[Results], aged: Sequence[Row]) -> Board:
+def _board(
+    wanted: Wanted, runs: Runs, merge: Sequence[Results], aged: Sequence[Mapping[str, Any]]
+) -> Board:
     head = {**wanted.head(), "versions": versions(), "machine": machine()}
     return Board(
         subject=wanted.subject, head=head, tracks=wanted.tracks, runs=runs, missing=wanted.missing,
@@ -210,7 +211,7 @@ def _board(wanted: Wanted, runs: Runs, merge: Sequence[Results], aged: Sequence[
 def _submitted(wanted: Wanted, runs: Runs, digests: Mapping[str, Digests], out: Path) -> Results:
     """The subject's runs, for others."""
     name, slam = str(wanted.submit), wanted.subject
-    kept: dict[str, dict[At, tuple[str, dict[str, Row]]]] = {}
+    kept: dict[str, Made] = {}
     for track, rows in runs.items():
         compared, own = Compared(out / track), kept.setdefault(track, {})
         for row in (row for row in rows if row["slam"] == slam):

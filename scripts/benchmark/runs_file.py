@@ -59,6 +59,7 @@ _NAME, _DIGEST = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}"), re.compile(r"[0
 Row = dict[str, Any]
 At = tuple[float, int]  # level and seed
 Digests = Mapping[At, str]  # of recordings
+Made = dict[At, tuple[str, dict[str, Row]]]  # digest of the recording, and a row of each SLAM
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -72,7 +73,7 @@ class Results:
     seconds    of each run of a submission; None: as long as the track says
     """
 
-    runs: Mapping[str, Mapping[At, tuple[str, Mapping[str, Row]]]]
+    runs: Mapping[str, Made]
     made_with: Mapping[str, Any]
     name: str = ""
     slam: str = ""
@@ -158,7 +159,7 @@ def checked_name(name: str, slam: str) -> str:
     return name
 
 
-def _check_whole(track: str, runs: Mapping[At, tuple[str, Mapping[str, Row]]], name: str) -> None:
+def _check_whole(track: str, runs: Made, name: str) -> None:
     """``InvalidValueError`` unless one SLAM made each level and seed, of the track's own seeds."""
     levels, seeds = ({at[k] for at in runs} for k in (0, 1))
     if not runs or runs.keys() != set(product(levels, seeds)):
@@ -239,7 +240,7 @@ def _results(path: Path, data: Row) -> Results:
     check_keys(path, "", submitted, _SUBMITTED if submitted else {})
     check_keys(path, "", data, {"columns": Rule(", ".join(columns), list(columns).__eq__)})
     check_known(path, world_of(path, data), data["tracks"])
-    runs: dict[str, dict[At, tuple[str, dict[str, Row]]]] = {name: {} for name in data["tracks"]}
+    runs: dict[str, Made] = {name: {} for name in data["tracks"]}
     for key, told in data["runs"].items():
         track, level, seed = key.split(" ")
         at = (float(level), int(seed))

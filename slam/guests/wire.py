@@ -95,7 +95,7 @@ class Guard:
         ``heard`` gets 1 or 2, for standard output or error, and the bytes, none at its end. False
         when the time (monotonic, s) is up before.
         """
-        left: bytes | memoryview = memoryview(unsent)
+        left = memoryview(unsent)
         with selectors.DefaultSelector() as selector:
             for number, stream in enumerate(self._streams):
                 if number or left:
@@ -107,12 +107,12 @@ class Guard:
                 for key, _ in selector.select(left_s):
                     with suppress(BlockingIOError):
                         if key.data:
-                            more: bytes | memoryview = os.read(key.fd, _CHUNK)
-                            if heard(key.data, more):
+                            data = os.read(key.fd, _CHUNK)
+                            if heard(key.data, data):
                                 return True
                         else:
-                            more = left = left[_written(key.fd, left) :]
-                        if not more:
+                            left = left[_written(key.fd, left) :]
+                        if not (data if key.data else left):
                             selector.unregister(key.fileobj)
         return True
 
