@@ -51,8 +51,8 @@ def test_submit_verify_and_merge(outside: Path):
     assert "`my_slam:MySlam` was lost in" in printed
     file = outside / "out/benchmark/submission_my_slam.json"
     data = json.loads(file.read_text())
-    assert data["slam"] == "my_slam:MySlam"
-    assert len(data["tracks"]["busy-chairs-v1"]["runs"]) == 3
+    assert data["submitted"]["slam"] == "my_slam:MySlam"
+    assert len(data["runs"]) == 3
 
     printed = call(verify)
     assert "same bytes" in printed
