@@ -51,7 +51,7 @@ class Limits:
 class PipeSlam:
     """The system behind a command. After a failure it is over; ``reset`` starts it again.
 
-    It has ``estimates_at_end`` (``slam.system.RunsAtTheEnd``) where its hello promises that.
+    It has ``estimates_at_end`` (``slam.interface.RunsAtTheEnd``) where its hello promises that.
 
     command      a line as a shell would split it (no shell runs it), or its words
     scan_limit_s, first_limit_s  see ``Limits``
