@@ -12,16 +12,17 @@ stay as they are.
 """
 
 import argparse
-import re
 import sys
 from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
-from scripts.benchmark.submission import MADE_WITH, RUN
+from msgspec import Meta
+
+from scripts.benchmark.submission import RUN
 from scripts.benchmark.tracks import (
     FRESH,
     LEVELS,
@@ -35,13 +36,14 @@ from scripts.comparison.folder import read as compared
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
 from scripts.comparison.recording import digest
-from scripts.comparison.rules import Rule, check_keys, number
+from scripts.comparison.rules import Columns, check_keys
 from scripts.console import ended, note
 from scripts.machine import machine, versions
 from scripts.report.answer import ODOMETRY
 from scripts.result_files import finite, load, write
 from sim.core.versions import WORLD, world_of
 from slam.errors import InvalidValueError, LogFormatError
+from slam.shaped import shaped
 
 FILE = Path(__file__).with_name("published.json")
 SCHEMA, WHAT = 2, "published runs of the benchmark of mobilia"
@@ -160,8 +162,7 @@ def write_from(
     Raises ``InvalidValueError`` for two folders whose recordings differ, for what is no commit, and
     for SLAMs of ``only`` that have no row in the folders.
     """
-    if not _COMMIT.holds(commit):
-        raise InvalidValueError(f"--commit must be {_COMMIT.wanted}, got {commit!r:.80}")
+    shaped("--commit", commit, _Commit)
     made_here: set[str] = set()
     before: dict[str, Any] = load(path, WHAT, SCHEMA) if path.exists() else {}
     runs, hashes = dict[str, Row](before.get("runs", {})), dict[str, str](before.get("tracks", {}))
@@ -206,23 +207,16 @@ def _short(value: Any) -> Any:
     return float(f"{value:.6g}") if isinstance(value, float) and finite(value) else finite(value)
 
 
-_HEAD: Mapping[str, Rule] = {
-    "columns": Rule(", ".join(COLUMNS), lambda value: value == list(COLUMNS)),
-    "made_with": MADE_WITH,
-}
-_COMMIT = Rule(
-    "the hash of a commit, 7 to 40 digits",
-    lambda value: isinstance(value, str) and bool(re.fullmatch("[0-9a-f]{7,40}", value)),
-)
-_CELLS: Mapping[str, Rule] = {
-    **RUN, "lost": number(most=1.0, whole=True), "commit": _COMMIT,
+_Commit = Annotated[
+    str, Meta(pattern=r"\A[0-9a-f]{7,40}\Z", description="the hash of a commit, 7 to 40 digits")
+]
+_HEAD: Columns = {
+    "columns": tuple[*(Literal[column] for column in COLUMNS)], "made_with": dict[str, Any],
 }  # fmt: skip
-_RUN: Mapping[str, Rule] = {
+_CELLS: Columns = {**RUN, "lost": Literal[0, 1], "commit": _Commit}
+_RUN: Columns = {
     **{key: RUN[key] for key in ("level", "seed", "recording")},
-    "slams": Rule(
-        f"an object of up to {MAX_SLAMS}",
-        lambda value: isinstance(value, dict) and len(value) <= MAX_SLAMS,
-    ),
+    "slams": Annotated[dict[str, Any], Meta(max_length=MAX_SLAMS)],
 }
 
 

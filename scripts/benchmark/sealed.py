@@ -17,6 +17,7 @@ from typing import Any
 
 from scripts.benchmark.submission import MAX_SEED, MAX_SEEDS, SEALED, SEEDS
 from scripts.benchmark.tracks import FRESH, TEST, TRAIN, Track, check_known, newest
+from scripts.comparison.rules import check_keys
 from scripts.result_files import load
 from sim.core.versions import WORLD, world_of
 from slam.errors import InvalidValueError, LogFormatError, OutputError
@@ -104,9 +105,9 @@ def read(path: Path) -> SealedSeeds:
         )
     check_known(path, world, tracks)
     seeds, salt = data[SEALED], data["salt"]
-    if not SEEDS.holds(seeds) or {*TRAIN, *TEST, *FRESH} & set(seeds):
-        wanted = f"{SEEDS.wanted}, each once, and none that is published"
-        raise LogFormatError(path, f"seeds must be {wanted}")
+    check_keys(path, "", data, {SEALED: SEEDS})
+    if len({*seeds}) < len(seeds) or {*TRAIN, *TEST, *FRESH} & set(seeds):
+        raise LogFormatError(path, "seeds must be each once, and none that is published")
     if not isinstance(salt, str) or not _SALT.fullmatch(salt):
         raise LogFormatError(path, "salt must be 64 hexadecimal digits")
     return SealedSeeds(seeds=tuple(seeds), salt=salt, world=world, tracks=tracks)

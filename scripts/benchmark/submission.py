@@ -12,9 +12,10 @@ import tempfile
 from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import asdict, dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 from numpy.typing import NDArray
 
 from scripts.benchmark.tracks import LEVELS, TRACKS, check_known
@@ -23,7 +24,7 @@ from scripts.comparison.entry import Entry
 from scripts.comparison.rules import (
     MAX_DEPTH,
     MOST,
-    Rule,
+    Columns,
     check_keys,
     is_shallow,
     many,
@@ -36,19 +37,20 @@ from scripts.output import configs_of
 from scripts.report.answer import ODOMETRY
 from scripts.result_files import finite, load
 from sim.core.versions import WORLD, world_of
+from sim.recording.recipe import Seconds
 from sim.recording.sums import check_vouched
 from sim.recording.verify import Finding
-from slam.checked import is_number
 from slam.errors import FAILURES, InvalidValueError, LogFormatError
 from slam.files import write_text
 from slam.frames import BeamClass, Float
 from slam.guests import Limits, limited
+from slam.shaped import Share
 from slam.system import names as registered
 from slam.variants import ORACLE
 
 SCHEMA, WHAT = 2, "submission to the benchmark of mobilia"
 MAX_SEEDS, MAX_WORDS = 1000, 2000  # of a file; characters of a name or failure
-MAX_SEED, MAX_SECONDS = 2**32 - 1, 86_400.0  # s of a run
+MAX_SEED = 2**32 - 1
 SEALED = "sealed"  # seeds that were published as a hash first (``scripts.benchmark.sealed``)
 SETS = ("test", "train", SEALED)
 OUTCOMES = ("finished", "lost", *FAILURES)
@@ -65,7 +67,7 @@ NUMBERS = (*_METRICS, *_ALSO)  # none of them is below 0
 OF_POSES = ("outcome", "lost", *(key for key in NUMBERS if key not in _COSTS))  # not of a machine
 _SHARES = ("_share", "_share_of_returns")  # at most 1
 _WORDS = {"level", "seed", "recording", "poses", "outcome", "failure", "lost", *NUMBERS}
-_NAME, _DIGEST = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}"), re.compile(r"[0-9a-f]{64}")
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}")
 Row = dict[str, Any]
 
 
@@ -202,6 +204,12 @@ def read(path: Path) -> Submission:
 def _submission(path: Path, data: Row) -> Submission:
     check_keys(path, "", data, _HEAD)
     levels, seeds, tracks = data["levels"], data["seeds"], data["tracks"]
+    if levels != sorted({*levels} & {*LEVELS}):
+        raise LogFormatError(path, f"levels must be of {LEVELS}, rising, got {levels!r:.80}")
+    if len({*seeds}) < len(seeds):
+        raise LogFormatError(path, f"seeds must be each once, got {seeds!r:.80}")
+    if not is_shallow(data["made_with"]):
+        raise LogFormatError(path, f"made_with must be at most {MAX_DEPTH} deep")
     check_known(path, world_of(path, data), {name: own["sha256"] for name, own in tracks.items()})
     runs = {}
     for name, own in tracks.items():
@@ -231,48 +239,25 @@ def _runs(path: Path, track: str, runs: Any, wanted: set[tuple[float, int]]) -> 
 
 
 _SEED, _POSITIVE = number(most=MAX_SEED, whole=True), number(most=MOST)
-LEVEL = Rule(f"of {LEVELS}", lambda value: is_number(value) and value in LEVELS)
-SHA256 = Rule("a SHA-256", lambda value: isinstance(value, str) and bool(_DIGEST.fullmatch(value)))
-SEEDS = Rule(
-    f"whole numbers, 0 to {MAX_SEED}",
-    lambda value: many(_SEED).holds(value) and len(value) <= MAX_SEEDS,
-)
-MADE_WITH = Rule(
-    f"an object, at most {MAX_DEPTH} deep",
-    lambda value: isinstance(value, dict) and is_shallow(value),
-)
-_HEAD: Mapping[str, Rule] = {
-    "slam": word(most=MAX_WORDS),
-    "name": Rule("a name", lambda value: isinstance(value, str)),
-    "seeds_of": Rule(" or ".join(SETS), word(among=SETS).holds),
-    "seeds": SEEDS,
-    "levels": Rule(
-        f"of {LEVELS}, rising",
-        lambda value: many(LEVEL).holds(value) and list(value) == sorted(value),
-    ),
-    "seconds": Rule(
-        f"null, or up to {MAX_SECONDS:g}",
-        lambda value: value is None or (value != 0 and number(most=MAX_SECONDS).holds(value)),
-    ),
-    "tracks": Rule("one or more", lambda value: isinstance(value, dict) and bool(value)),
-    "made_with": MADE_WITH,
-}
-RUN: Mapping[str, Rule] = {
-    "level": LEVEL, "seed": _SEED, "recording": SHA256, "poses": SHA256,
+_SHA256 = Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z", description="a SHA-256")]
+SEEDS = Annotated[list[_SEED], Meta(min_length=1, max_length=MAX_SEEDS)]
+_HEAD: Columns = {
+    "slam": word(most=MAX_WORDS), "name": str, "seeds_of": word(among=SETS), "seeds": SEEDS,
+    "levels": many(Share), "seconds": Seconds | None,
+    "tracks": Annotated[dict[str, Any], Meta(min_length=1)], "made_with": dict[str, Any],
+}  # fmt: skip
+RUN: Columns = {
+    "level": Share, "seed": _SEED, "recording": _SHA256, "poses": _SHA256,
     "outcome": word(among=OUTCOMES), "failure": word(most=MAX_WORDS, optional=True),
     **{
         key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS
     },
 }  # fmt: skip
-_FINISHED: Mapping[str, Rule] = {
-    "lost": number(most=0.0, whole=True),
-    "lost_at_s": Rule("null where it finished, and else not", lambda value: value is None),
-    "ate_unaligned_m": _POSITIVE, "error_tracking_m": _POSITIVE,
+_FINISHED: Columns = {
+    "lost": Literal[0], "lost_at_s": None, "ate_unaligned_m": _POSITIVE,
+    "error_tracking_m": _POSITIVE,
 }  # fmt: skip
-_LOST: Mapping[str, Rule] = {
-    "lost": number(least=1.0, most=1.0, whole=True),
-    "lost_at_s": Rule("null where it finished, and else not", lambda value: value is not None),
-}
+_LOST: Columns = {"lost": Literal[1], "lost_at_s": _POSITIVE}
 
 
 _TOLD = ("outcome", "ate_unaligned_m", "error_tracking_m")  # of a run with other poses

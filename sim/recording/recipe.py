@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
 from scenes.crowd import crowd_of
 from scenes.scene_file import sha256_of
-from sim.core.checks import number, one_of, within
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
@@ -35,11 +35,13 @@ from slam.bounded import json_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.files import write_text
 from slam.names import NameFromFile
+from slam.shaped import one_of, shaped, within
 
 RECIPE = "recipe.json"
 SCHEMA = 1
 MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
+Seconds = Annotated[float, Meta(gt=0.0, le=MAX_SECONDS)]
 _AXES = ("motion", "change")
 # Added since the first recipes: without a word where they are None.
 _LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s", "events", "robot",
@@ -106,11 +108,7 @@ class Recipe:
         Seeds(self.seed)
         rates = Dynamism.at(self.dynamism)
         Dynamism.of(rates, self.moving_share, motion=self.motion, change=self.change)
-        number("Recipe.seconds", self.seconds)
-        if not 0.0 < self.seconds <= MAX_SECONDS:
-            raise InvalidValueError(
-                f"Recipe.seconds must be > 0 and at most {MAX_SECONDS:g}, got {self.seconds}"
-            )
+        shaped("Recipe.seconds", self.seconds, Seconds)
         one_of("Recipe.odometry", self.odometry, tuple(PRESETS))
         if self.twin != "":
             one_of("Recipe.twin", self.twin, TWINS)
