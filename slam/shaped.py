@@ -172,8 +172,8 @@ def wanted(kind: inspect.Type) -> str:
 def _length(kind: inspect.StrType | inspect.ListType | inspect.VarTupleType, what: str) -> str:
     least, most = kind.min_length or 0, kind.max_length
     if most is not None:
-        return f" of {least} to {most} {what}"
-    return f" of {least} {what} or more" if least else ""
+        return f" of {least} to {most} {what}" if least < most else f" of {most} {what}"
+    return f" of {least} or more {what}" if least else ""
 
 
 def _bounds(kind: inspect.IntType | inspect.FloatType) -> str:

@@ -121,6 +121,8 @@ def read(path: Path = FILE) -> Published:
             track, level, seed = key.split(" ")
             at = (float(level), int(seed))
             check_keys(path, f"{key}: ", {"level": at[0], "seed": at[1], **told}, _RUN)
+            if at[0] not in LEVELS:
+                raise LogFormatError(path, f"{key}: level must be of {LEVELS}")
             if track not in data["tracks"]:
                 raise LogFormatError(path, f"{key}: a track without its hash")
             rows = {slam: _row(path, f"{key}, {slam}: ", of) for slam, of in told["slams"].items()}

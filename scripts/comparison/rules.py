@@ -12,14 +12,14 @@ from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, inspect
 from numpy.typing import NDArray
 
 from scripts.options import MOST_PEOPLE, PEOPLE
 from slam.archives import Header
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import word_of
-from slam.shaped import PRINTABLE, Share, shaped
+from slam.shaped import PRINTABLE, Share, shaped, wanted
 
 MOST = 1e100  # of a finite number, either way: its squares and their sums are finite too
 MAX_WORD = 2000  # letters of a name: what is longer is the name of no file
@@ -137,7 +137,8 @@ def check_keys(path: Path, where: str, found: Mapping[str, Any], kinds: Columns)
     """``LogFormatError`` for the first key that is not there, or not of its kind."""
     for key, kind in kinds.items():
         if key not in found:
-            raise LogFormatError(path, f"lacks {where}{key}")
+            told = wanted(inspect.type_info(kind))
+            raise LogFormatError(path, f"lacks {where}{key}, which must be {told}")
         try:
             shaped(f"{where}{key}", found[key], kind)
         except InvalidValueError as error:

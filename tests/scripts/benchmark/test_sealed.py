@@ -45,8 +45,8 @@ def test_the_seal_is_of_each_seed_its_order_and_the_salt():
     [
         ("sealed", [720], "none that is published"),
         ("sealed", [21, 21], "each once"),
-        ("sealed", [2**40], "whole numbers"),
-        ("sealed", "21", "whole numbers"),
+        ("sealed", [2**40], "whole number"),
+        ("sealed", "21", "sealed must be a list"),
         ("salt", "", "64 hexadecimal"),
         ("what", "a recipe", "no sealed seeds"),
         ("tracks", {}, "one or more"),
