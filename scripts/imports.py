@@ -39,7 +39,7 @@ def with_imports(file: Path, module: str, package: str = "") -> tuple[Path, ...]
             continue
         found.add(path)
         for imported in _imported(path, name):
-            first = imported.partition(".")[0]
+            first, *_ = imported.split(".")
             if first == (package or first) and (root.name not in INSTALLED or first == top):
                 waiting += _files(root, imported)
     return tuple(sorted(found))
