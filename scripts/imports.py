@@ -26,7 +26,7 @@ def with_imports(file: Path, module: str, package: str = "") -> tuple[Path, ...]
 
     ``module`` is its dotted name: it tells the folder that holds the module, or the whole package.
     What lies there counts; of what is installed only the package itself. Names made up at run time
-    (``importlib.import_module(word)``) and imports from elsewhere on the path are not seen.
+    and imports from elsewhere on the path are not seen.
     """
     top, *below = module.split(".")
     depth = len(below) + (file.name == "__init__.py")
