@@ -152,8 +152,8 @@ def wanted(kind: inspect.Type) -> str:
             number = "whole number" if isinstance(kind, inspect.IntType) else "number"
             return f"a {finite}{number}{_bounds(kind)}"
         case inspect.LiteralType():
-            words = ", ".join(map(str, kind.values))
-            return f"one of {words}" if len(kind.values) > 1 else words
+            known = ", ".join(map(str, kind.values))
+            return f"one of {known}" if len(kind.values) > 1 else known
         case inspect.TupleType():
             words = list(map(wanted, kind.item_types))
             each = f", each {words[0]}" if len(set(words)) == 1 else f": {', '.join(words)}"

@@ -12,10 +12,10 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import metadata
 from pathlib import Path
-from typing import Annotated, Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
-from msgspec import Meta
+from msgspec import Meta, Struct
 
 from scenes.crowd import crowd_of
 from scenes.scene_file import sha256_of
@@ -277,6 +277,14 @@ class Made:
         return "; ".join(changes)
 
 
+class _File(Struct):
+    schema: Literal[1]
+    recipe: dict[str, Any]
+    recipe_sha256: str
+    made_with: dict[str, Any]
+    result: dict[str, Any]
+
+
 def read_recipe(path: Path) -> Made:
     """Inverse of ``write_recipe``; ``LogFormatError`` that names the file for anything else.
 
@@ -284,23 +292,17 @@ def read_recipe(path: Path) -> Made:
     another version of the world: ``sim.core.versions.check_world`` before it is simulated.
     """
     data = json_of(path, MAX_BYTES, "recipe")
-    wanted = ("schema", "recipe", "recipe_sha256", "made_with", "result")
-    if any(name not in data for name in wanted):
-        raise LogFormatError(path, f"no recipe: expected {', '.join(wanted)}")
-    if data["schema"] != SCHEMA:
-        raise LogFormatError(path, f"recipe of schema {data['schema']!r}, expected {SCHEMA}")
-    parts = [data["recipe"], data["made_with"], data["result"]]
-    if not all(isinstance(part, dict) for part in parts):
-        raise LogFormatError(path, "no recipe: its parts are no objects")
-    unknown = sorted(set(parts[0]) - {f.name for f in fields(Recipe)})
-    if unknown:
-        raise LogFormatError(path, f"unknown key {unknown[0]!r} in the recipe")
-    if isinstance(parts[0].get("scene"), str):
-        parts[0]["scene"] = NameFromFile(parts[0]["scene"], path)
     try:
-        recipe = Recipe(**parts[0])
+        file: _File = shaped("", data, _File)
+        own = file.recipe
+        if unknown := sorted(set(own) - {f.name for f in fields(Recipe)}):
+            raise InvalidValueError(f"unknown key {unknown[0]!r} in the recipe")
+        if isinstance(own.get("scene"), str):
+            own["scene"] = NameFromFile(own["scene"], path)
+        recipe = Recipe(**own)
     except (InvalidValueError, UnknownNameError, TypeError) as error:
         raise LogFormatError(path, f"no recipe: {error}") from error
-    if recipe.sha256 != data["recipe_sha256"]:
+    if recipe.sha256 != file.recipe_sha256:
         raise LogFormatError(path, "damaged: recipe_sha256 is not that of the recipe")
-    return Made(recipe=recipe, made_with=parts[1], result=parts[2], world=world_of(path, data))
+    world = world_of(path, data)
+    return Made(recipe=recipe, made_with=file.made_with, result=file.result, world=world)
