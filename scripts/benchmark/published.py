@@ -116,6 +116,8 @@ def read(path: Path = FILE) -> Published:
     try:
         check_known(path, world_of(path, data), data["tracks"])
         check_keys(path, "", data, _HEAD)
+        if data["columns"] != list(COLUMNS):
+            raise LogFormatError(path, f"columns must be {', '.join(COLUMNS)}")
         runs: dict[str, dict[tuple[float, int], tuple[str, dict[str, Row]]]] = {}
         for key, told in data["runs"].items():
             track, level, seed = key.split(" ")
@@ -212,9 +214,7 @@ def _short(value: Any) -> Any:
 _Commit = Annotated[
     str, Meta(pattern=r"\A[0-9a-f]{7,40}\Z", description="the hash of a commit, 7 to 40 digits")
 ]
-_HEAD: Columns = {
-    "columns": tuple[*(Literal[column] for column in COLUMNS)], "made_with": dict[str, Any],
-}  # fmt: skip
+_HEAD: Columns = {"columns": list[str], "made_with": dict[str, Any]}
 _CELLS: Columns = {**RUN, "lost": Literal[0, 1], "commit": _Commit}
 _RUN: Columns = {
     **{key: RUN[key] for key in ("level", "seed", "recording")},

@@ -238,16 +238,17 @@ def _runs(path: Path, track: str, runs: Any, wanted: set[tuple[float, int]]) -> 
     return runs
 
 
-_SEED, _POSITIVE = number(most=MAX_SEED, whole=True), number(most=MOST)
+_POSITIVE = number(most=MOST)
+_Seed = Annotated[int, Meta(ge=0, le=MAX_SEED)]
 _SHA256 = Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z", description="a SHA-256")]
-SEEDS = Annotated[list[_SEED], Meta(min_length=1, max_length=MAX_SEEDS)]
+SEEDS = Annotated[list[_Seed], Meta(min_length=1, max_length=MAX_SEEDS)]
 _HEAD: Columns = {
     "slam": word(most=MAX_WORDS), "name": str, "seeds_of": word(among=SETS), "seeds": SEEDS,
     "levels": many(Share), "seconds": Seconds | None,
     "tracks": Annotated[dict[str, Any], Meta(min_length=1)], "made_with": dict[str, Any],
 }  # fmt: skip
 RUN: Columns = {
-    "level": Share, "seed": _SEED, "recording": _SHA256, "poses": _SHA256,
+    "level": Share, "seed": _Seed, "recording": _SHA256, "poses": _SHA256,
     "outcome": word(among=OUTCOMES), "failure": word(most=MAX_WORDS, optional=True),
     **{
         key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS

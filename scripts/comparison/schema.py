@@ -135,7 +135,7 @@ LATER: Columns = {
     "crowd": word(optional=True), "odometry": _NAME, "sets": list[dict[str, Any]],
     "judge_maps": bool,
     "sessions": number(least=2.0, most=MOST_SESSIONS, whole=True, optional=True),
-    "scene_sha256": dict[str, _NAME],
+    "scene_sha256": dict[str, Line],
 }  # fmt: skip
 """Settings that recipes of before did not have."""
 RECIPE: Columns = {
