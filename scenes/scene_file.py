@@ -3,7 +3,6 @@
 
 import hashlib
 import math
-import tomllib
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,7 +16,7 @@ from scenes.plan import furniture
 from scenes.plan_file import MAX_BYTES, MOST_BOXES
 from scenes.recipe import Count
 from scenes.scene import Pose
-from slam.bounded import beside, bytes_of, text_of
+from slam.bounded import beside, bytes_of, toml_of
 from slam.errors import InvalidValueError
 from slam.shaped import Table, one_of, shaped
 
@@ -97,11 +96,8 @@ def pose_of(x: float, y: float, degrees: float) -> Pose:
 
 
 def tables(path: Path) -> dict[str, Any]:
-    """The keys of a TOML file; ``InvalidValueError`` names the file and what is wrong."""
-    try:
-        found = tomllib.loads(text_of(path, MAX_BYTES))
-    except (ValueError, RecursionError) as error:  # a number of too many digits, too
-        raise InvalidValueError(f"{path}: no TOML: {error}") from error
+    """The keys of a TOML file; ``InvalidValueError`` and ``LogFormatError`` name what is wrong."""
+    found = toml_of(path, MAX_BYTES)
     for key in found:
         if key not in KEYS:
             raise InvalidValueError(

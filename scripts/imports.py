@@ -26,7 +26,7 @@ def with_imports(file: Path, module: str, package: str = "") -> tuple[Path, ...]
 
     ``module`` is its dotted name: it tells the folder that holds the module, or the whole package.
     What lies there counts; of what is installed only the package itself. Names made up at run time
-    (``importlib.import_module(word)``) and imports from elsewhere on the path are not seen.
+    and imports from elsewhere on the path are not seen.
     """
     top, *below = module.split(".")
     depth = len(below) + (file.name == "__init__.py")
@@ -39,7 +39,7 @@ def with_imports(file: Path, module: str, package: str = "") -> tuple[Path, ...]
             continue
         found.add(path)
         for imported in _imported(path, name):
-            first = imported.partition(".")[0]
+            first, *_ = imported.split(".")
             if first == (package or first) and (root.name not in INSTALLED or first == top):
                 waiting += _files(root, imported)
     return tuple(sorted(found))

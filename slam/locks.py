@@ -14,7 +14,7 @@ import os
 import time
 import uuid
 from collections.abc import Iterator
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from pathlib import Path
 from typing import IO
 
@@ -59,10 +59,8 @@ def _alone(folder: Path) -> Iterator[None]:
     path = folder / LOCK
     while True:
         with _opened(path) as held:
-            try:
-                fcntl.flock(held, fcntl.LOCK_EX | fcntl.LOCK_NB)
-            except BlockingIOError as error:
-                raise OutputError(f"{folder} is being written by another process") from error
+            if not _got(held, fcntl.LOCK_EX, 0.0):
+                raise OutputError(f"{folder} is being written by another process")
             if _same(held, path):
                 yield
                 return
@@ -95,7 +93,7 @@ def _got(file: IO[str], kind: int, wait_s: float) -> bool:
         with suppress(BlockingIOError):
             fcntl.flock(file, kind | fcntl.LOCK_NB)
             return True
-        if time.monotonic() > deadline:
+        if time.monotonic() >= deadline:
             return False
         time.sleep(_AGAIN_S)
 
@@ -113,27 +111,19 @@ def working(folder: Path, shown: str) -> Iterator[None]:
 
     Raises ``OutputError`` when one has, or the folder cannot be locked.
     """
-    with _shared(folder) as own:
+    with ExitStack() as stack:
+        own = ""
+        try:
+            file = stack.enter_context(_opened(folder / WORKERS, "r"))
+            if _got(file, fcntl.LOCK_SH, WAIT_S):
+                own = file.read()
+        except FileNotFoundError:
+            pass
+        except OSError as error:
+            raise OutputError(f"cannot lock {folder}: {error.strerror or error}") from error
         if own != shown:
             raise OutputError(f"{folder} has been taken up by another command")
         yield
-
-
-@contextmanager
-def _shared(folder: Path) -> Iterator[str]:
-    try:
-        file = _opened(folder / WORKERS, "r")
-    except FileNotFoundError:
-        yield ""
-        return
-    except OSError as error:
-        raise OutputError(f"cannot lock {folder}: {error.strerror or error}") from error
-    with file:
-        try:
-            own = file.read() if _got(file, fcntl.LOCK_SH, WAIT_S) else ""
-        except OSError as error:
-            raise OutputError(f"cannot lock {folder}: {error.strerror or error}") from error
-        yield own
 
 
 def idle(folder: Path, wait_s: float = WAIT_S) -> bool:

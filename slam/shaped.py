@@ -19,14 +19,26 @@ import msgspec
 import numpy as np
 from msgspec import Meta, inspect
 
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, meant
 
 MOST = sys.float_info.max
+FAR_M = 1e6  # no place of a scene is farther away
+MOST_LETTERS = 100  # of a name
+# pattern of words without control characters, ends of lines or marks that turn the reading
+PRINTABLE = (
+    r"\A[^\x00-\x1f\x7f-\x9f\xad\u200b-\u200f\u2028-\u202e\u2060-\u2069\ufeff\ud800-\udfff]*\Z"
+)
 Number = Annotated[float, Meta(ge=-MOST, le=MOST)]  # any finite one
 Positive = Annotated[float, Meta(gt=0.0, le=MOST)]
 NotNegative = Annotated[float, Meta(ge=0.0, le=MOST)]
 Share = Annotated[float, Meta(ge=0.0, le=1.0)]
-PRINTABLE = r"\A[^\x00-\x1f\x7f-\x9f\u2028\u2029]*\Z"  # pattern of words without control characters
+Word = Annotated[str, Meta(max_length=MOST_LETTERS, pattern=PRINTABLE)]
+Metres = Annotated[float, Meta(ge=-FAR_M, le=FAR_M)]
+Point = tuple[Metres, Metres, Metres]
+Pose = Annotated[
+    tuple[Number, Number, Number],
+    Meta(description="three finite numbers (x m, y m, heading rad)"),
+]
 _MANY = (inspect.ListType, inspect.VarTupleType)
 _OBJECT = (inspect.StructType, inspect.DataclassType)
 
@@ -35,15 +47,16 @@ class Table(msgspec.Struct, frozen=True, forbid_unknown_fields=True):
     """Base of what a table of a file holds; keys that it does not know are refused."""
 
 
-def shaped(owner: str, value: Any, kind: Any) -> Any:
+def shaped(owner: str, value: Any, kind: Any, *, strict: bool = True) -> Any:
     """``value`` as a ``kind``: a number, word, list, ``Table`` or union, with its bounds.
 
-    owner  what the value is, for the error
+    owner   what the value is, for the error
+    strict  else a number may be given as its text, as in the cells of a table
     Raises ``InvalidValueError`` that names the field, what was expected, and the value.
     """
     value = _plain(value)
     try:
-        return msgspec.convert(value, kind)
+        return msgspec.convert(value, kind, strict=strict)
     except msgspec.ValidationError as error:
         said, _, place = str(error).partition(" - at `$")
         raise InvalidValueError(_told(owner, value, inspect.type_info(kind), said, place)) from None
@@ -52,6 +65,11 @@ def shaped(owner: str, value: Any, kind: Any) -> Any:
 def within(owner: str, value: Any, low: float, high: float) -> float:
     """``value`` as a float; ``InvalidValueError`` unless it is a number in [low, high]."""
     return float(shaped(owner, value, Annotated[float, Meta(ge=low, le=high)]))
+
+
+def whole(owner: str, value: Any, least: int, most: int) -> int:
+    """``value``; ``InvalidValueError`` unless it is a whole number from ``least`` to ``most``."""
+    return int(shaped(owner, value, Annotated[int, Meta(ge=least, le=most)]))
 
 
 def one_of(owner: str, value: Any, known: Collection[str]) -> str:
@@ -78,10 +96,10 @@ def check(config: Any) -> None:
 
 
 def _plain(value: Any) -> Any:
-    """Without NumPy's scalars, in a tuple too."""
+    """Without NumPy's scalars and arrays, in a tuple too."""
     if isinstance(value, tuple):
         return tuple(map(_plain, value))
-    return value.item() if isinstance(value, np.generic) else value
+    return value.tolist() if isinstance(value, np.generic | np.ndarray) else value
 
 
 @cache
@@ -101,54 +119,61 @@ def _told(owner: str, value: Any, kind: inspect.Type, said: str, place: str) -> 
         else:
             owner, value = f"{owner}[{at}]", value[int(at)]
             kind = kind.item_type if isinstance(kind, _MANY) else kind.item_types[int(at)]  # type: ignore[attr-defined]
-    kind, key = _holding(kind, value), re.search(r"field `(.*)`", said)
-    if key and isinstance(kind, _OBJECT):
-        known = {f.encode_name: f.type for f in kind.fields}
+    told, key = _holding(kind, value), re.search(r"field `(.*)`", said)
+    if key and isinstance(told, _OBJECT):
+        known = {f.encode_name: f.type for f in told.fields}
         if key[1] not in known:
             where = f"{owner}: " if owner else ""
-            return f"{where}unknown key {key[1]!r:.80}; known: {', '.join(known)}"
+            near = meant(key[1], known)
+            return f"{where}unknown key {key[1]!r:.80}; known: {', '.join(known)}.{near}"
         where = f"{owner}.{key[1]}" if owner else key[1]
         return f"{where} must be {wanted(known[key[1]])}, got nothing"
     return f"{owner} must be {wanted(kind)}, got {value!r:.80}"
 
 
 def _holding(kind: inspect.Type, value: Any) -> inspect.Type:
-    """Of several types the one that may hold such a value."""
+    """Of several types the one that may hold such a value, without its words."""
     if isinstance(kind, inspect.UnionType) and isinstance(value, (dict, list, tuple)):
         sort = _OBJECT if isinstance(value, dict) else (*_MANY, inspect.TupleType)
-        return next((one for one in kind.types if isinstance(one, sort)), kind)
-    return kind
+        bare = (_holding(one, value) for one in kind.types)
+        return next((one for one in bare if isinstance(one, sort)), kind)
+    return _holding(kind.type, value) if isinstance(kind, inspect.Metadata) else kind
 
 
 def wanted(kind: inspect.Type) -> str:
-    """A type in words."""
-    if isinstance(kind, inspect.UnionType):
-        return " or ".join(map(wanted, kind.types))
-    if isinstance(kind, (inspect.IntType, inspect.FloatType)):
-        finite = "finite " if kind.le == MOST else ""
-        number = "whole number" if isinstance(kind, inspect.IntType) else "number"
-        return f"a {finite}{number}{_bounds(kind)}"
-    if isinstance(kind, inspect.LiteralType):
-        return f"one of {', '.join(map(str, kind.values))}" if len(kind.values) > 1 else str(
-            kind.values[0]
-        )  # fmt: skip
-    if isinstance(kind, inspect.TupleType):
-        words = list(map(wanted, kind.item_types))
-        each = f", each {words[0]}" if len(set(words)) == 1 else f": {', '.join(words)}"
-        return f"{len(words)} values{each}"
-    if isinstance(kind, inspect.StrType) and kind.pattern not in (None, PRINTABLE):
-        return f"a word that matches {kind.pattern}"
-    if isinstance(kind, (*_MANY, inspect.StrType)):
-        what = "letters" if isinstance(kind, inspect.StrType) else "values"
-        sort = "a word" if what == "letters" else "a list"
-        least, most = kind.min_length or 0, kind.max_length
-        few = f" of {least} to {most} {what}" if most is not None else f" of {least} {what} or more"
-        return sort + few if least or most is not None else sort
-    if isinstance(kind, _OBJECT):
-        return f"a {kind.cls.__name__}" if isinstance(kind, inspect.DataclassType) else "a table"
-    return {"BoolType": "True or False", "NoneType": "None"}.get(
-        type(kind).__name__, "another type"
-    )
+    """A type in words, which its ``Meta`` may give as ``description``."""
+    match kind:
+        case inspect.Metadata():
+            return str((kind.extra_json_schema or {})["description"])
+        case inspect.UnionType():
+            return " or ".join(map(wanted, kind.types))
+        case inspect.IntType() | inspect.FloatType():
+            finite = "finite " if kind.le == MOST else ""
+            number = "whole number" if isinstance(kind, inspect.IntType) else "number"
+            return f"a {finite}{number}{_bounds(kind)}"
+        case inspect.LiteralType():
+            known = ", ".join(map(str, kind.values))
+            return f"one of {known}" if len(kind.values) > 1 else known
+        case inspect.TupleType():
+            words = list(map(wanted, kind.item_types))
+            each = f", each {words[0]}" if len(set(words)) == 1 else f": {', '.join(words)}"
+            return f"{len(words)} values{each}"
+        case inspect.StrType():
+            free = kind.pattern in (None, PRINTABLE)
+            return f"a word{_length(kind, 'letters') if free else f' that matches {kind.pattern}'}"
+        case inspect.ListType() | inspect.VarTupleType():
+            return f"a list{_length(kind, 'values')}"
+        case inspect.StructType() | inspect.DictType():
+            return "a table"
+    own = f"a {kind.cls.__name__}" if isinstance(kind, inspect.DataclassType) else "another type"
+    return {"BoolType": "True or False", "NoneType": "None"}.get(type(kind).__name__, own)
+
+
+def _length(kind: inspect.StrType | inspect.ListType | inspect.VarTupleType, what: str) -> str:
+    least, most = kind.min_length or 0, kind.max_length
+    if most is not None:
+        return f" of {least} to {most} {what}" if least < most else f" of {most} {what}"
+    return f" of {least} or more {what}" if least else ""
 
 
 def _bounds(kind: inspect.IntType | inspect.FloatType) -> str:
@@ -157,4 +182,4 @@ def _bounds(kind: inspect.IntType | inspect.FloatType) -> str:
     if low is not None and high is not None:
         return f" from {low:g} to {high:g}"
     words = [(">", kind.gt), (">=", low), ("<", kind.lt), ("<=", high)]
-    return "".join(f" {mark} {bound:g}" for mark, bound in words if bound is not None)
+    return " and".join(f" {mark} {bound:g}" for mark, bound in words if bound is not None)

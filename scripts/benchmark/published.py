@@ -17,7 +17,7 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark.runs_file import CELLS, COMMIT, FILE, At, Results, Row, read, write
+from scripts.benchmark.runs_file import CELLS, FILE, At, Commit, Results, Row, read, write
 from scripts.benchmark.tracks import FRESH, LEVELS, TRACKS, Track, chosen
 from scripts.comparison.folder import read as compared
 from scripts.comparison.make import carry_out as compare
@@ -27,6 +27,7 @@ from scripts.console import ended, note
 from scripts.machine import machine, versions
 from scripts.result_files import finite
 from slam.errors import InvalidValueError
+from slam.shaped import shaped
 
 
 def digests(plan: Plan, folder: Path) -> dict[At, str]:
@@ -47,8 +48,7 @@ def write_from(
     Raises ``InvalidValueError`` for two folders whose recordings differ, for what is no commit, and
     for SLAMs of ``only`` that have no row in the folders.
     """
-    if not COMMIT.holds(commit):
-        raise InvalidValueError(f"--commit must be {COMMIT.wanted}, got {commit!r:.80}")
+    shaped("--commit", commit, Commit)
     made: Row = {"versions": versions(), "machine": machine()}
     before = read(path) if path.exists() else Results(runs={}, made_with=made)
     runs = {track: dict(own) for track, own in before.runs.items()}

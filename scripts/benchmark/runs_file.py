@@ -13,13 +13,15 @@ from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
+
+from msgspec import Meta
 
 from scripts.benchmark.tracks import LEVELS, QUICK_LEVELS, TRACKS, Track, check_known
 from scripts.comparison.rules import (
     MAX_DEPTH,
     MOST,
-    Rule,
+    Columns,
     check_keys,
     is_shallow,
     number,
@@ -29,10 +31,11 @@ from scripts.metrics.table import METRICS
 from scripts.report.answer import ODOMETRY
 from scripts.result_files import load
 from sim.core.versions import WORLD, world_of
+from sim.recording.recipe import Seconds
 from sim.recording.sums import check_vouched
-from slam.checked import is_number
 from slam.errors import FAILURES, InvalidValueError, LogFormatError
 from slam.files import write_text
+from slam.shaped import Share
 from slam.system import names as registered
 from slam.variants import ORACLE
 
@@ -54,8 +57,8 @@ _ALSO = ("scans", "lost_at_s", "not_trusted_share", "moving_share_of_returns")
 NUMBERS = (*_METRICS, *_ALSO)  # none of them is below 0
 SUBMITTED = ("poses", "failure", "outcome", "lost", *NUMBERS)  # columns of a submission
 _SHARES = ("_share", "_share_of_returns")  # at most 1
-MAX_SLAMS, MAX_WORDS, MAX_SEED, MAX_SECONDS = 100, 2000, 2**32 - 1, 86_400.0
-_NAME, _DIGEST = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}"), re.compile(r"[0-9a-f]{64}")
+MAX_SLAMS, MAX_WORDS, MAX_SEED = 100, 2000, 2**32 - 1
+_NAME = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]{0,39}")
 Row = dict[str, Any]
 At = tuple[float, int]  # level and seed
 Digests = Mapping[At, str]  # of recordings
@@ -238,13 +241,18 @@ def _results(path: Path, data: Row) -> Results:
     submitted = data.get("submitted", {})
     columns = SUBMITTED if submitted else COLUMNS
     check_keys(path, "", submitted, _SUBMITTED if submitted else {})
-    check_keys(path, "", data, {"columns": Rule(", ".join(columns), list(columns).__eq__)})
+    if data["columns"] != list(columns):
+        raise LogFormatError(path, f"columns must be {', '.join(columns)}")
+    if not is_shallow(data["made_with"]):
+        raise LogFormatError(path, f"made_with must be at most {MAX_DEPTH} deep")
     check_known(path, world_of(path, data), data["tracks"])
     runs: dict[str, Made] = {name: {} for name in data["tracks"]}
     for key, told in data["runs"].items():
         track, level, seed = key.split(" ")
         at = (float(level), int(seed))
         check_keys(path, f"{key:.80}: ", {"level": at[0], "seed": at[1], **told}, _RUN)
+        if at[0] not in LEVELS:
+            raise LogFormatError(path, f"{key:.80}: level must be of {LEVELS}")
         if track not in runs or key != _key(track, at):
             raise LogFormatError(path, f"{key:.80}: a track without its hash, level and seed")
         rows = {s: _row(path, f"{key}, {s:.80}: ", columns, of) for s, of in told["slams"].items()}
@@ -259,53 +267,30 @@ def _row(path: Path, where: str, columns: Sequence[str], cells: Sequence[Any]) -
     return row
 
 
-_SHA256 = Rule("a SHA-256", lambda value: isinstance(value, str) and bool(_DIGEST.fullmatch(value)))
-COMMIT = Rule(
-    "the hash of a commit, 7 to 40 digits",
-    lambda value: isinstance(value, str) and bool(re.fullmatch("[0-9a-f]{7,40}", value)),
-)
-_OBJECT = Rule("an object", lambda value: isinstance(value, dict))
-_HEAD: Mapping[str, Rule] = {
-    "made_with": Rule(
-        f"an object, at most {MAX_DEPTH} deep",
-        lambda value: isinstance(value, dict) and is_shallow(value),
-    ),
-    "tracks": _OBJECT,
-    "runs": _OBJECT,
-}
-_SUBMITTED: Mapping[str, Rule] = {
-    "name": Rule("a name", lambda value: isinstance(value, str) and bool(value)),
-    "slam": word(most=MAX_WORDS),
-    "seconds": Rule(
-        f"null, or up to {MAX_SECONDS:g}",
-        lambda value: value is None or (value != 0 and number(most=MAX_SECONDS).holds(value)),
-    ),
-}
-_RUN: Mapping[str, Rule] = {
-    "level": Rule(f"of {LEVELS}", lambda value: is_number(value) and value in LEVELS),
-    "seed": number(most=MAX_SEED, whole=True),
-    "recording": _SHA256,
-    "slams": Rule(
-        f"an object of up to {MAX_SLAMS}",
-        lambda value: isinstance(value, dict) and len(value) <= MAX_SLAMS,
-    ),
-}
-_CELLS: Mapping[str, Rule] = {
-    "poses": _SHA256,
-    "commit": COMMIT,
-    "outcome": word(among=("finished", "lost", *FAILURES)),
-    "failure": word(most=MAX_WORDS, optional=True),
-    "lost": number(most=1.0, whole=True),
-    **{key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS},
-}
 _POSITIVE = number(most=MOST)
-_FINISHED: Mapping[str, Rule] = {
-    "lost": number(most=0.0, whole=True),
-    "lost_at_s": Rule("null where it finished, and else not", lambda value: value is None),
-    "ate_unaligned_m": _POSITIVE,
+_SHA256 = Annotated[str, Meta(pattern=r"\A[0-9a-f]{64}\Z", description="a SHA-256")]
+Commit = Annotated[
+    str, Meta(pattern=r"\A[0-9a-f]{7,40}\Z", description="the hash of a commit, 7 to 40 digits")
+]
+_HEAD: Columns = {
+    "made_with": dict[str, Any], "tracks": dict[str, Any], "runs": dict[str, Any],
+    "columns": list[str],
+}  # fmt: skip
+_SUBMITTED: Columns = {
+    "name": Annotated[str, Meta(min_length=1)], "slam": word(most=MAX_WORDS),
+    "seconds": Seconds | None,
+}  # fmt: skip
+_RUN: Columns = {
+    "level": Share, "seed": number(most=MAX_SEED, whole=True), "recording": _SHA256,
+    "slams": Annotated[dict[str, Any], Meta(max_length=MAX_SLAMS)],
+}  # fmt: skip
+_CELLS: Columns = {
+    "poses": _SHA256, "commit": Commit, "outcome": word(among=("finished", "lost", *FAILURES)),
+    "failure": word(most=MAX_WORDS, optional=True), "lost": Literal[0, 1],
+    **{key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS},
+}  # fmt: skip
+_FINISHED: Columns = {
+    "lost": Literal[0], "lost_at_s": None, "ate_unaligned_m": _POSITIVE,
     "error_tracking_m": _POSITIVE,
-}
-_LOST: Mapping[str, Rule] = {
-    "lost": number(least=1.0, most=1.0, whole=True),
-    "lost_at_s": Rule("null where it finished, and else not", lambda value: value is not None),
-}
+}  # fmt: skip
+_LOST: Columns = {"lost": Literal[1], "lost_at_s": _POSITIVE}

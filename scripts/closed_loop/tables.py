@@ -2,17 +2,18 @@
 """From runs to ``goals.csv``, ``runs.csv`` and ``levels.csv``, and how a report reads them back."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from scripts.closed_loop.plan import IDENTITY, SCHEMA
 from scripts.closed_loop.runs import DrivenRun
 from scripts.comparison.folder import axis_in, check_recipe
-from scripts.comparison.rules import Columns, Rule, Table, check_keys, named, number, word
+from scripts.comparison.rules import Columns, Table, check_keys, number, word
 from scripts.comparison.tables import Row, grouped, read_csv
 from scripts.output import RECIPE, check_whole
 from slam.errors import LogFormatError
@@ -127,8 +128,12 @@ TABLE = Table(
     ),
 )  # fmt: skip
 """``levels.csv``."""
-_RECIPE: Mapping[str, Rule] = {"command": word(among=("drive",)), "settings": named({})}
-_LOOP = named({"tolerance_m": number(most=1e9), "plan_on": word(among=("layout", "map"))})
+_RECIPE: Columns = {"command": Literal["drive"], "settings": dict[str, Any]}
+
+
+class _Loop(Struct):
+    tolerance_m: Annotated[float, Meta(ge=0.0, le=1e9)]
+    plan_on: Literal["layout", "map"]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -174,7 +179,7 @@ def driven(folder: Path, *, vouched: bool = False) -> Driven:
     if settings.get("drive_schema") != SCHEMA:
         got = f"settings.drive_schema is {settings.get('drive_schema')!r:.80}"
         raise LogFormatError(folder, f"no closed-loop drive of schema {SCHEMA}: {got}")
-    check_keys(path, "settings.", settings, {"loop": _LOOP})
+    check_keys(path, "settings.", settings, {"loop": _Loop})
     rows = read_csv(folder / LEVELS, TABLE, axis_in(settings, path), vouched=vouched)
     if not rows:
         raise LogFormatError(folder / LEVELS, "a table without rows")

@@ -19,7 +19,7 @@ from pathlib import Path
 from typing import Any
 
 from scripts.comparison.plan import Run
-from scripts.comparison.rules import PLAIN, Rule, check_keys
+from scripts.comparison.rules import MAX_DEPTH, Columns, check_keys, is_shallow
 from scripts.comparison.run_file import RunFile
 from scripts.comparison.schema import (
     AGES,
@@ -76,7 +76,10 @@ class Compared:
             got = f"settings.compare_schema is {told.get('compare_schema')!r:.80}"
             raise LogFormatError(path, f"no comparison of schema {SCHEMA}: {got}")
         check_keys(path, "settings.", told, settings(axis_in(told, path)))
-        check_keys(path, "settings.", told, {k: rule for k, rule in LATER.items() if k in told})
+        check_keys(path, "settings.", told, {k: kind for k, kind in LATER.items() if k in told})
+        for key in ("slams", "scenes", "levels", "seeds"):
+            if len(set(told[key])) < len(told[key]):
+                raise LogFormatError(path, f"settings.{key} must name each once, got {told[key]}")
         return recipe
 
     @property
@@ -201,10 +204,10 @@ def axis_in(told: Mapping[str, Any], path: Path) -> str:
     return str(told.get("axis", AXES[0]))
 
 
-def check_recipe(path: Path, rules: Mapping[str, Rule]) -> Row:
-    """The words of a recipe; ``LogFormatError`` for a key that is not there, or not by its rule."""
+def check_recipe(path: Path, kinds: Columns) -> Row:
+    """The words of a recipe; ``LogFormatError`` for a key that is not there, or not of its kind."""
     recipe = read_recipe_words(path)
-    if not PLAIN.holds(recipe):  # what is nested deeper cannot even be shown
-        raise LogFormatError(path, f"must be {PLAIN.wanted}")
-    check_keys(path, "", recipe, rules)
+    if not is_shallow(recipe):  # what is nested deeper cannot even be shown
+        raise LogFormatError(path, f"must be plain data, nested {MAX_DEPTH} deep at most")
+    check_keys(path, "", recipe, kinds)
     return recipe

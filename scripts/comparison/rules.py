@@ -1,119 +1,56 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a cell of a table, a setting of a recipe, a field of a submission or an array may be.
 
-A rule is a word, a number, a list of such, a mapping: ``word``, ``number``, ``many``, ``named``,
-``PLAIN``, ``TRUTH``, or whatever else passes a test. An ``Array`` of an archive has its type and
-shape checked before it is unpacked, then its values.
+A kind is a type as ``slam.shaped`` takes it: ``word``, ``number``, a list or table of such. An
+``Array`` of an archive has its type and shape checked before it is unpacked, then its values.
 """
 
 import math
-import re
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Iterable, Mapping
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta, inspect
 from numpy.typing import NDArray
 
 from scripts.options import MOST_PEOPLE, PEOPLE
 from slam.archives import Header
-from slam.checked import is_number, is_whole
-from slam.errors import LogFormatError
+from slam.errors import InvalidValueError, LogFormatError
 from slam.files import word_of
+from slam.shaped import PRINTABLE, Share, shaped, wanted
 
 MOST = 1e100  # of a finite number, either way: its squares and their sums are finite too
 MAX_WORD = 2000  # letters of a name: what is longer is the name of no file
 MAX_MESSAGE = 100_000  # letters of what a SLAM said when it failed; the csv module reads 131072
 MAX_DEPTH = 16  # of lists and mappings within each other
-_NUMBER = re.compile(r"[-+]?(\d{1,400}(\.\d{0,400})?(e[-+]?\d{1,4})?|inf)", re.ASCII)
+Line = Annotated[str, Meta(min_length=1, max_length=MAX_WORD, pattern=PRINTABLE)]
+Kind = Any  # a type as msgspec knows it
 
 
-@dataclass(frozen=True)
-class Rule:
-    """What a value must be.
-
-    wanted  it in words, for "must be ..."
-    holds   whether a value is one
-    parsed  the value of a cell that is not empty; NaN where it holds none, which no rule allows
-    """
-
-    wanted: str
-    holds: Callable[[Any], bool]
-    parsed: Callable[[str], Any] = word_of
-
-
-def word(*, among: tuple[str, ...] = (), most: int = MAX_WORD, optional: bool = False) -> Rule:
+def word(*, among: tuple[str, ...] = (), most: int = MAX_WORD, optional: bool = False) -> Kind:
     """One line of letters that print; ``among`` these if any, None too where ``optional``."""
-    wanted = f"a printable word of 1 to {most} letters"
+    kind: Kind = Annotated[str, Meta(min_length=1, max_length=most, pattern=PRINTABLE)]
     if among:
-        wanted = among[0] if len(among) == 1 else f"one of {', '.join(among)}"
-
-    def holds(value: Any) -> bool:
-        if value is None or not isinstance(value, str):
-            return optional and value is None
-        return value in among if among else 0 < len(value) <= most and value.isprintable()
-
-    return Rule(wanted + _or_none(optional), holds)
+        kind = Literal[among]
+    return kind | None if optional else kind
 
 
 def number(
     *, least: float = 0.0, most: float = math.inf, whole: bool = False, optional: bool = False
-) -> Rule:
-    """A number from ``least`` to ``most``. An infinite end allows ``MOST`` and itself.
-
-    whole     whole numbers alone; a cell may have one as 3.0
-    optional  None too
-    """
-    low, high = -MOST if least == -math.inf else least, f"{most:g}"
-    if most == math.inf:
-        high = f"{MOST:g} or infinite"
-    elif int(most) == most < MOST:
-        high = str(int(most))
-
-    def holds(value: Any) -> bool:
-        if value is None:
-            return optional
-        if not (is_whole(value) or (is_number(value) and not whole)):
-            return False
-        return least <= value <= most and (abs(value) <= MOST or value in (math.inf, -math.inf))
-
-    def parsed(cell: str) -> Any:
-        if not _NUMBER.fullmatch(cell):
-            return math.nan
-        value = float(cell)
-        if whole and value.is_integer():
-            return int(cell) if cell.isdecimal() else int(value)
-        return value
-
-    kind = "a whole number" if whole else "a number"
-    return Rule(f"{kind} from {low:g} to {high}" + _or_none(optional), holds, parsed)
+) -> Kind:
+    """A number from ``least`` to ``most``, or a whole one. None too where ``optional``."""
+    sort: Kind = int if whole else float
+    ends = {"ge": least, "le": most}
+    bounds = {end: sort(bound) for end, bound in ends.items() if math.isfinite(bound)}
+    kind: Kind = Annotated[sort, Meta(**bounds)] if bounds else sort
+    return kind | None if optional else kind
 
 
-def many(of: Rule) -> Rule:
-    """A list of values, each of them by the same rule and there once; 1 at least."""
-
-    def holds(value: Any) -> bool:
-        if not isinstance(value, list | tuple) or not value:
-            return False
-        return all(map(of.holds, value)) and len(set(value)) == len(value)
-
-    return Rule(f"a list of one or more, each once and {of.wanted}", holds)
-
-
-def named(fields: Mapping[str, Rule], others: Rule | None = None) -> Rule:
-    """A mapping from words, with at least these; what else is in it is ``others``."""
-    told = "; ".join(f"{name!r}: {rule.wanted}" for name, rule in fields.items())
-
-    def holds(value: Any) -> bool:
-        if not isinstance(value, Mapping) or not all(isinstance(name, str) for name in value):
-            return False
-        if not all(name in value and rule.holds(value[name]) for name, rule in fields.items()):
-            return False
-        rest = (one for name, one in value.items() if name not in fields)
-        return others is None or all(map(others.holds, rest))
-
-    return Rule(f"a mapping with {told}" if fields else "a mapping of plain values", holds)
+def many(of: Kind) -> Kind:
+    """A list of one or more of these."""
+    return Annotated[list[of], Meta(min_length=1)]
 
 
 def is_shallow(value: object, most: int = MAX_DEPTH) -> bool:
@@ -132,22 +69,15 @@ def _within(value: object) -> Iterable[object]:
     return value if isinstance(value, list | tuple) else ()
 
 
-def _or_none(optional: bool) -> str:
-    return " or nothing" if optional else ""
-
-
-PLAIN = Rule(f"plain data, nested {MAX_DEPTH} deep at most", is_shallow)
-TRUTH = Rule("true or false", lambda value: isinstance(value, bool))
-SHARE = number(most=1.0)
-Columns = Mapping[str, Rule]
+Columns = Mapping[str, Kind]
 LEVEL = "level"  # the axis of ``scripts.comparison.plan.Plan.sets``
 
 
-def level_of(axis: str) -> Rule:
+def level_of(axis: str) -> Kind:
     """What a level of that axis may be."""
     if axis == PEOPLE:
         return number(most=MOST_PEOPLE)
-    return number(least=-1e6, most=1e6) if axis == LEVEL else SHARE
+    return number(least=-1e6, most=1e6) if axis == LEVEL else Share
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -165,35 +95,54 @@ class Table:
     parts: tuple[tuple[str, str], ...] = ()
     together: tuple[str, ...] = ()
 
-    def at(self, axis: str) -> Columns:
-        """The rules of its columns where levels are of that axis."""
-        level = {"dynamism": level_of(axis)} if "dynamism" in self.columns else {}
-        return {**self.columns, **level}
+    def row(self, given: Mapping[str, Any], axis: str) -> dict[str, Any]:
+        """The row of these values, or of the words of their cells, where levels are of that axis.
 
-    def impossible(self, row: Mapping[str, Any]) -> str:
-        """Why the cells of a row, each right by its rule, cannot stand together; "" if they can."""
-        told = [name for name in self.together if row.get(name) is not None]
+        NaN and empty words are None. ``InvalidValueError`` names the column that is wrong.
+        """
+        level = {"dynamism": level_of(axis)} if "dynamism" in self.columns else {}
+        row = {
+            column: _cell(axis if column == "dynamism" else column, given.get(column), kind)
+            for column, kind in {**self.columns, **level}.items()
+        }
+        if said := self._impossible(row):
+            raise InvalidValueError(said)
+        return row
+
+    def _impossible(self, row: Mapping[str, Any]) -> str:
+        """Why the cells of a row, each right by its kind, cannot stand together; "" if they can."""
+        told = [name for name in self.together if row[name] is not None]
         if told and len(told) < len(self.together):
             return f"{', '.join(self.together)} must all be there or none, got {', '.join(told)}"
         for part, whole in self.parts:
-            most, count = row.get(whole), row.get(part)
+            most, count = row[whole], row[part]
             if count is not None and most is not None and count > most:
                 return f"{part} must be at most {whole}, {most}, got {count}"
         for name in ("value", "low", "high") if row.get("statistic") == "share" else ():
-            if not SHARE.holds(row[name]):
-                return f"{name} must be {SHARE.wanted}, as it is of a share, got {row[name]}"
+            if not 0.0 <= row[name] <= 1.0:
+                return f"{name} must be a number from 0 to 1, as it is of a share, got {row[name]}"
         return ""
 
 
-def check_keys(path: Path, where: str, found: Mapping[str, Any], rules: Mapping[str, Rule]) -> None:
-    """``LogFormatError`` for the first key that is not there, or not by its rule."""
-    for key, rule in rules.items():
+def _cell(name: str, given: Any, kind: Kind) -> Any:
+    if given == "" or given != given:
+        given = None
+    value = shaped(name, word_of(given) if isinstance(given, str) else given, kind, strict=False)
+    if isinstance(value, float) and not (abs(value) <= MOST or math.isinf(value)):
+        raise InvalidValueError(f"{name} must be at most {MOST:g} or infinite, got {given!r:.80}")
+    return value
+
+
+def check_keys(path: Path, where: str, found: Mapping[str, Any], kinds: Columns) -> None:
+    """``LogFormatError`` for the first key that is not there, or not of its kind."""
+    for key, kind in kinds.items():
         if key not in found:
-            raise LogFormatError(path, f"lacks {where}{key}, which must be {rule.wanted}")
-        if not rule.holds(found[key]):
-            raise LogFormatError(
-                path, f"{where}{key} must be {rule.wanted}, got {found[key]!r:.80}"
-            )
+            told = wanted(inspect.type_info(kind))
+            raise LogFormatError(path, f"lacks {where}{key}, which must be {told}")
+        try:
+            shaped(f"{where}{key}", found[key], kind)
+        except InvalidValueError as error:
+            raise LogFormatError(path, str(error)) from error
 
 
 MOST_CELLS = 1 << 28  # of a raster, as ``slam.maps`` reads it

@@ -8,20 +8,19 @@ array that is not named here is not read.
 
 import math
 from collections.abc import Mapping
+from typing import Any
+
+from msgspec import Struct
 
 from scripts.comparison.rules import (
     LEVEL,
     MAX_MESSAGE,
-    PLAIN,
-    SHARE,
-    TRUTH,
     Array,
     Columns,
-    Rule,
+    Line,
     Table,
     level_of,
     many,
-    named,
     number,
     word,
 )
@@ -31,6 +30,7 @@ from scripts.options import AXES
 from sim.recording.recipe import MAX_SECONDS
 from sim.world.times_of_day import MOST_SESSIONS
 from slam.answers import LEAST_CELL_M, MOST_CELL_M, MOST_M
+from slam.shaped import Share
 
 SCHEMA = 1
 RUNS, RUNS_JSON, LEVELS, PAIRED = "runs.csv", "runs.json", "levels.csv", "paired.csv"
@@ -44,10 +44,10 @@ OVER_TIME = (
 )  # fmt: skip
 """Columns of sessions of which there is an early and a late one. The last two are times."""
 _NAME = word()
-_SEED = number(most=2.0**63, whole=True)
+_SEED = number(most=2**63 - 1, whole=True)
 _MAYBE_SHARE = number(most=1.0, optional=True)
 _COUNT, _MAYBE_COUNT = number(most=1e9, whole=True), number(most=1e9, whole=True, optional=True)
-_SIGNED = number(least=-math.inf)
+_SIGNED, _ONE_OR_MORE = number(least=-math.inf), number(least=1, most=1e9, whole=True)
 _POSITIVE, _MAYBE = number(), number(optional=True)
 _MAYBE_ONE = number(most=1.0, whole=True, optional=True)
 _FAILURE = word(most=MAX_MESSAGE, optional=True)
@@ -65,8 +65,7 @@ _RUNS: Columns = {
 }  # fmt: skip
 _SUMMARY: Columns = {
     "metric": word(among=tuple(METRICS)), "statistic": word(among=("median", "share")),
-    "n": number(least=1.0, most=1e9, whole=True),
-    "value": _SIGNED, "low": _SIGNED, "high": _SIGNED,
+    "n": _ONE_OR_MORE, "value": _SIGNED, "low": _SIGNED, "high": _SIGNED,
 }  # fmt: skip
 _LEVELS: Columns = {
     "scene": _NAME, "dynamism": level_of("dynamism"), "slam": _NAME, **_SUMMARY,
@@ -76,9 +75,9 @@ _PAIRED: Columns = {
     "scene": _NAME, "dynamism": level_of("dynamism"), "metric": word(among=tuple(METRICS)),
     "slam_a": _NAME, "slam_b": _NAME, "n": _SUMMARY["n"],
     "median_difference": _SIGNED, "low": _SIGNED, "high": _SIGNED,
-    "wins": _COUNT, "ties": _COUNT, "losses": _COUNT, "p_sign": SHARE,
+    "wins": _COUNT, "ties": _COUNT, "losses": _COUNT, "p_sign": Share,
 }  # fmt: skip
-_BUILDING: Columns = {"scene": _NAME, "motion": SHARE, "change": SHARE}
+_BUILDING: Columns = {"scene": _NAME, "motion": Share, "change": Share}
 _TO_FIND = ("to_find", "found", "found_soon", "wrong", "known", "known_soon")
 _AGES: Columns = {
     **_BUILDING, "seed": _SEED, "slam": _NAME, "map": word(among=(DAYS, ANEW)),
@@ -87,9 +86,9 @@ _AGES: Columns = {
     "found_share": _MAYBE_SHARE, "found_soon_share": _MAYBE_SHARE,
     **dict.fromkeys(("rmse_session0_m", "rmse_session1_m", "rmse_last_m", "rmse_growth"), _MAYBE),
     **{
-        name: rule
+        name: kind
         for age in OLD
-        for name, rule in ((f"right_age{age}", _MAYBE_ONE), (f"rmse_age{age}_m", _MAYBE))
+        for name, kind in ((f"right_age{age}", _MAYBE_ONE), (f"rmse_age{age}_m", _MAYBE))
     },
     **{f"{name}_{when}": _MAYBE for name in OVER_TIME for when in ("early", "late")},
     "outdated_told": _MAYBE, "outdated_false": _MAYBE,
@@ -113,7 +112,13 @@ TABLES: Mapping[str, Table] = {
 """By file."""
 
 
-def settings(axis: str) -> Mapping[str, Rule]:
+class Machine(Struct):
+    """What a study was made on, as far as it is read."""
+
+    processor: Line
+
+
+def settings(axis: str) -> Columns:
     """The settings of a recipe, levels being of that axis."""
     return {
         "compare_schema": number(least=SCHEMA, most=SCHEMA, whole=True),
@@ -121,22 +126,21 @@ def settings(axis: str) -> Mapping[str, Rule]:
         "seeds": many(_SEED), "seconds": number(most=MAX_SECONDS),
         "every": number(least=1.0, most=1000.0, whole=True), "scanner": _NAME,
         "scan_limit_s": number(most=1e9), "lost_rule": word(),
-        "machine": named({"processor": word()}, others=PLAIN),
+        "machine": Machine,
     }  # fmt: skip
 
 
-LATER: Mapping[str, Rule] = {
+LATER: Columns = {
     "axis": word(among=(*AXES, LEVEL)), "motion": _MAYBE_SHARE, "change": _MAYBE_SHARE,
-    "crowd": word(optional=True), "odometry": _NAME, "sets": PLAIN, "judge_maps": TRUTH,
+    "crowd": word(optional=True), "odometry": _NAME, "sets": list[dict[str, Any]],
+    "judge_maps": bool,
     "sessions": number(least=2.0, most=MOST_SESSIONS, whole=True, optional=True),
-    "scene_sha256": named({}, others=word()),
+    "scene_sha256": dict[str, Line],
 }  # fmt: skip
 """Settings that recipes of before did not have."""
-RECIPE: Mapping[str, Rule] = {
-    "command": word(among=("compare",)),
-    "settings": named({}),
-    "versions": named({}, others=PLAIN),
-}
+RECIPE: Columns = {
+    "command": word(among=("compare",)), "settings": dict[str, Any], "versions": dict[str, Any],
+}  # fmt: skip
 """The recipe around them."""
 
 

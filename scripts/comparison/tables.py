@@ -119,18 +119,11 @@ def write_checked(
     path: Path, rows: Sequence[Mapping[str, Any]], table: Table, axis: str = "dynamism"
 ) -> None:
     """The same by the rules of the table; ``InvalidValueError`` for rows that break one."""
-    rules = table.at(axis)
     for number, row in enumerate(rows, 1):
-        for column, rule in rules.items():
-            value = row.get(column)
-            if isinstance(value, float) and math.isnan(value):
-                value = None
-            if not rule.holds(value):
-                raise InvalidValueError(
-                    f"{path.name}, row {number}: {column} must be {rule.wanted}, got {value!r:.80}"
-                )
-        if said := table.impossible(row):
-            raise InvalidValueError(f"{path.name}, row {number}: {said}")
+        try:
+            table.row(row, axis)
+        except InvalidValueError as error:
+            raise InvalidValueError(f"{path.name}, row {number}: {error}") from error
     write_csv(path, rows, tuple(table.columns), axis)
 
 
@@ -165,23 +158,14 @@ def _rows(path: Path, lines: Any, table: Table, names: Mapping[str, str]) -> Ite
         if head.count(name) != 1:
             many = "more than one column" if name in head else "a table without the column"
             raise LogFormatError(path, f"{many} {name!r}", 1)
-    rules = table.at(names.get("dynamism", ""))
     places = {column: head.index(name) for column, name in names.items()}
     for line in lines:
         if len(line) != len(head):
             raise LogFormatError(
                 path, f"must have {len(head)} cells, got {len(line)}", lines.line_num
             )
-        row: Row = {}
-        for column, rule in rules.items():
-            cell = line[places[column]]
-            row[column] = None if cell == "" else rule.parsed(cell)
-            if not rule.holds(row[column]):
-                raise LogFormatError(
-                    path,
-                    f"column {names[column]!r} must be {rule.wanted}, got {cell!r:.80}",
-                    lines.line_num,
-                )
-        if said := table.impossible(row):
-            raise LogFormatError(path, said, lines.line_num)
-        yield row
+        cells = {column: line[place] for column, place in places.items()}
+        try:
+            yield table.row(cells, names.get("dynamism", ""))
+        except InvalidValueError as error:
+            raise LogFormatError(path, str(error), lines.line_num) from error

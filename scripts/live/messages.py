@@ -14,7 +14,7 @@ from typing import Annotated, Any, Literal
 import msgspec
 from msgspec import Meta
 
-from sim.core.checks import FAR_M, MOST_LETTERS, Point
+from slam.shaped import FAR_M, MOST_LETTERS, Point
 
 log = logging.getLogger(__name__)
 

@@ -12,11 +12,10 @@ from typing import Annotated
 from msgspec import Meta
 
 from scripts.live import FASTEST, SLOWEST
-from sim.core.checks import Point, Word
 from sim.view.moment import Shown
 from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import InvalidValueError, MobiliaError
-from slam.shaped import Share, check
+from slam.shaped import Point, Share, Word, check
 
 MOST_WAITING = 64  # requests; a client that sends more is told so
 MOST_TWIST = 1e3  # m/s and rad/s; the drive clips to what it can do

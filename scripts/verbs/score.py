@@ -45,10 +45,10 @@ def score(
     [bold]mobilia score my_bag --on out/dataset/episode-0/bag --pose /amcl_pose[/bold]
     """  # fmt: skip
     from scripts.single_run.run import Log, on_log
-    from sim.core.checks import within
     from slam.frames import EPOCH
     from slam.logs.bag import read_bag
     from slam.ros.recorded import RecordedSlam, aligned, read_statements
+    from slam.shaped import within
     from slam.system import register
 
     within("--clock-offset", clock_offset, -MOST_OFFSET_S, MOST_OFFSET_S)

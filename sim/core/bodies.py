@@ -11,11 +11,11 @@ from numpy.typing import NDArray
 
 from scenes.footprint import at_rest
 from scenes.kinds import joint_of_door
-from sim.core.checks import numbers
 from sim.core.flow import box_clearance
 from sim.core.state import Records
 from slam._jit import njit
 from slam.errors import InvalidValueError
+from slam.shaped import Pose, shaped
 
 if TYPE_CHECKING:
     from scenes.scene import Mover, Scene
@@ -148,10 +148,10 @@ class Bodies:
 
     def place_robot(self, data: mujoco.MjData, pose: Sequence[float]) -> None:
         """Put the robot at (x, y, heading); ``InvalidValueError`` where it does not fit."""
-        x, y, yaw = numbers("start", pose, 3, "(x m, y m, heading rad)")
+        x, y, yaw = shaped("start", pose, Pose)
         here = self.poses(data)
-        if self.robot is None or not math.isfinite(x + y + yaw):
-            raise InvalidValueError(f"start must be a finite pose of a robot, got {pose!r}")
+        if self.robot is None:
+            raise InvalidValueError(f"start must be a pose of a robot, got {pose!r}")
         data.qpos[self._robot_at : self._robot_at + 3] = x, y, yaw
         for k, mover in enumerate(self.scene.movers):
             if k == self.robot or mover.group == "door":

@@ -12,7 +12,6 @@ from gymnasium import spaces
 from numpy.typing import NDArray
 
 from scenes import SCAN_HEIGHT
-from sim.core.checks import one_of, switch, whole
 from sim.core.contacts import Contact
 from sim.core.dynamism import Dynamism
 from sim.gym.begin import Ahead, begun
@@ -25,7 +24,7 @@ from sim.sensors.lidar.registry import ScannerConfig
 from sim.simulation import Simulation
 from slam.errors import MobiliaError
 from slam.frames import LaserSpec
-from slam.shaped import Positive, shaped
+from slam.shaped import Positive, one_of, shaped, whole
 from slam.system import SlamSystem
 
 V_MAX_MPS, OMEGA_MAX_RADPS = 0.8, 1.2  # what an action of 1 means
@@ -171,7 +170,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
             scan_height_m=scan_height_m, odometry=odometry, labels=labels,
         )  # fmt: skip
         shaped("time_limit_s", time_limit_s, Positive)
-        switch("terminate_on_collision", terminate_on_collision)
+        shaped("terminate_on_collision", terminate_on_collision, bool)
         one_of("reward", reward, REWARDS)
         whole("frame_skip", frame_skip, 1, MOST_SCANS)
         one_of("scans", scans, ("all", "last"))

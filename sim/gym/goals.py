@@ -6,16 +6,17 @@ There are three rewards for a robot that is to reach a goal. All go by the truth
 
 import math
 from dataclasses import dataclass
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta
 
-from sim.core.checks import numbers
 from sim.driving.navgrid import NavGrid
 from sim.world.kidnapping import hull_discs
 from sim.world.world import World
 from slam.errors import InvalidValueError
 from slam.frames import Float
+from slam.shaped import shaped
 
 GOAL_RADIUS_M = 0.4  # m from the goal at which it counts as reached
 FAR_M = 1e4  # m, of a goal from the world's origin: the observation space tells no more
@@ -27,18 +28,13 @@ _AJAR_M = 0.03  # m, half the thickness of a door's leaf
 _BLOCKED = 1e6  # cost of a cell that cannot be reached (``NavGrid.cost_to``)
 
 Goal = tuple[float, float]
+_Near = Annotated[float, Meta(ge=-FAR_M, le=FAR_M)]  # m
 
 
 def goal_of(name: str, value: Any) -> Goal | str | None:
     """None, "random" or (x, y) m, both finite and within 10 km; else ``InvalidValueError``."""
-    if value is None or (isinstance(value, str) and value == RANDOM):
-        return value
-    x, y = numbers(name, value, 2, "'random' or (x, y) in m")
-    if not (math.isfinite(x) and math.isfinite(y)):
-        raise InvalidValueError(f"{name} must be finite, got {value!r}")
-    if max(abs(x), abs(y)) > FAR_M:
-        raise InvalidValueError(f"{name} must lie within {FAR_M:g} m, got {value!r}")
-    return x, y
+    goal: Goal | str | None = shaped(name, value, Literal["random"] | tuple[_Near, _Near] | None)
+    return goal
 
 
 class Ground:

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an environment tells a policy, and shows: its space, finite ranges, two pictures."""
 
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
 from gymnasium import spaces
+from msgspec import Meta
 from numpy.typing import NDArray
 
-from sim.core.checks import one_of, whole_numbers
 from sim.gym.pose_source import PoseSource
 from sim.simulation import Simulation
 from slam._jit import njit
 from slam.frames import LaserSpec
+from slam.shaped import one_of, shaped
 
 _MAX_TICKS = 2**40
 
@@ -51,7 +52,7 @@ def observed(
 
 MODES = ("rgb_array", "map")
 VIEWS = ("top", "follow", "persp")  # of every scene; ``sim.view.camera`` needs OpenGL to import
-MAX_PX = 8192  # edge of a picture
+_Pixels = Annotated[int, Meta(ge=1, le=8192)]  # of an edge of a picture
 
 
 class Rendering:
@@ -69,7 +70,7 @@ class Rendering:
             one_of("render_mode", mode, MODES)
         one_of("view", view, VIEWS)
         self._mode, self._view = mode, view
-        self._size = whole_numbers("render_size", size, "(width, height) in px", MAX_PX)
+        self._size = shaped("render_size", size, tuple[_Pixels, _Pixels])
         self._picture: Any = None
         self._camera: Any = None
 

@@ -1,30 +1,35 @@
 # SPDX-License-Identifier: Apache-2.0
 """What an environment takes, checked by name: arguments, the options of a reset, actions."""
 
-import difflib
-import math
 from collections.abc import Mapping
 from dataclasses import dataclass, fields, replace
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta, defstruct
 from numpy.typing import NDArray
 
 from scenes.crowd import crowd_of
 from scenes.registry import check_name
 from scenes.scene import HIGHEST, LOWEST
-from sim.core.checks import instance, numbers, switch, within
 from sim.core.dynamism import Dynamism
 from sim.gym.goals import Goal, goal_of
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.registry import ScannerConfig, scanner_of
 from sim.sensors.odometry.config import preset
 from slam.errors import InvalidValueError
+from slam.shaped import Pose, instance, shaped, within
 
 OPTIONS = (
     "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "motion", "change",
     "crowd", "moving_share", "rates", "scan_height_m", "resolution_deg", "noise_std_m", "laser",
 )  # fmt: skip
+_BY_NAME = dict.fromkeys(("seeds", "scene", "rates"), dict[str, Any] | None)
+_Options = defstruct(  # the values of the others are checked where they are used
+    "Options",
+    [(name, _BY_NAME.get(name, Any), None) for name in OPTIONS],
+    forbid_unknown_fields=True,
+)
 
 
 def checked_settings(**settings: Any) -> dict[str, Any]:
@@ -39,7 +44,7 @@ def checked_settings(**settings: Any) -> dict[str, Any]:
     instance("odometry", odometry, str)
     preset(odometry)
     within("scan_height_m", settings["scan_height_m"], LOWEST, HIGHEST)
-    switch("labels", settings["labels"])
+    shaped("labels", settings["labels"], bool)
     return {
         **settings,
         "crowd": crowd if crowd is None else str(crowd_of(crowd)),
@@ -68,18 +73,8 @@ def episode(
 
     Raises ``InvalidValueError`` naming the option that is unknown or has a value it cannot have.
     """
-    if not isinstance(options, Mapping | None):
-        raise InvalidValueError(f"reset options must be a dictionary or None, got {options!r:.200}")
-    if not all(isinstance(name, str) for name in options or {}):
-        raise InvalidValueError(f"reset options have words as keys, got {options!r:.200}")
-    given = {k: v for k, v in (options or {}).items() if v is not None or k not in OPTIONS}
-    for name in sorted(given):
-        if name not in OPTIONS:
-            near = difflib.get_close_matches(name, OPTIONS, n=1)
-            hint = f", did you mean {near[0]!r}?" if near else "."
-            raise InvalidValueError(
-                f"unknown reset option {name!r}{hint} Known: {', '.join(sorted(OPTIONS))}"
-            )
+    own = shaped("reset options", {} if options is None else options, _Options)
+    given = {name: value for name in OPTIONS if (value := getattr(own, name)) is not None}
     merged = dict(settings)
     merged |= _scene_options(given, settings)
     passed_on = ("n_chairs", "n_people", "scan_height_m", "crowd")
@@ -92,47 +87,28 @@ def episode(
         merged["crowd"] = str(crowd_of(merged["crowd"]))
     merged["laser"] = _laser(merged["laser"], given)
     if "start" in given:
-        merged["start"] = _finite("start", given["start"], 3, "(x m, y m, heading rad)")
+        merged["start"] = shaped("option start", given["start"], Pose)
     return Episode(
         settings=merged,
-        seeds=mapping("seeds", given.get("seeds")),
+        seeds=given.get("seeds", {}),
         goal=goal_of("option goal", given.get("goal", goal)),
     )
 
 
 def checked_seed(seed: Any) -> int | None:
     """None or a whole number >= 0, of NumPy's or Python's; else ``InvalidValueError``."""
-    if seed is None:
-        return None
-    if isinstance(seed, bool) or not isinstance(seed, (int, np.integer)) or seed < 0:
-        raise InvalidValueError(f"seed must be a whole number >= 0 or None, got {seed!r:.200}")
-    return int(seed)
-
-
-def mapping(name: str, value: Any) -> dict[str, Any]:
-    """A plain dictionary with words as keys; empty for None."""
-    if value is None:
-        return {}
-    if not isinstance(value, Mapping) or not all(isinstance(key, str) for key in value):
-        raise InvalidValueError(f"option {name} must be a dictionary, got {value!r}")
-    return dict(value)
+    number: int | None = shaped("seed", seed, Annotated[int, Meta(ge=0)] | None)
+    return number
 
 
 def _scene_options(given: Mapping[str, Any], settings: Mapping[str, Any]) -> dict[str, Any]:
     """Options of the scene's recipe; the simulation's own settings are not among them."""
-    options = mapping("scene", given.get("scene"))
+    options: dict[str, Any] = given.get("scene", {})
     for name in sorted(set(options) & {"seed", "drive", *settings}):
         raise InvalidValueError(
             f"option scene takes options of the scene's recipe, and {name!r} is none of them"
         )
     return options
-
-
-def _finite(name: str, value: Any, n: int, meaning: str) -> tuple[float, ...]:
-    out = numbers(f"option {name}", value, n, meaning)
-    if not all(math.isfinite(v) for v in out):
-        raise InvalidValueError(f"option {name} must be finite, got {value!r}")
-    return out
 
 
 def _rates(settings: Mapping[str, Any], given: Mapping[str, Any]) -> Dynamism:
@@ -141,7 +117,7 @@ def _rates(settings: Mapping[str, Any], given: Mapping[str, Any]) -> Dynamism:
     axes = {name: given.get(name, said.get(name)) for name in ("motion", "change")}
     dynamism = given.get("dynamism", settings["dynamism"])
     rates = Dynamism.of(dynamism, given.get("moving_share"), **axes)
-    changes = mapping("rates", given.get("rates"))
+    changes = given.get("rates", {})
     known = {f.name for f in fields(Dynamism)}
     for name in sorted(set(changes) - known):
         raise InvalidValueError(

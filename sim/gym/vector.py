@@ -18,13 +18,13 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from sim.core.checks import switch, whole
 from sim.gym.block import Block, Board
 from sim.gym.env import MobiliaEnv, ResetNeededError
 from sim.gym.observation import Observation
 from sim.gym.options import array_of, checked_seed, of_rooms
 from sim.gym.workers import RoomsEndedError, Workers
 from slam.errors import InvalidValueError
+from slam.shaped import shaped, whole
 
 MOST_ENVS = 4096  # each holds a physics model of its own
 MOST_WORKERS = 1024
@@ -73,7 +73,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     ) -> None:
         whole("num_envs", num_envs, 1, MOST_ENVS)
         whole("n_workers", n_workers, 0, MOST_WORKERS)
-        switch("frames", frames)
+        shaped("frames", frames, bool)
         if "n_threads" in settings:
             raise InvalidValueError("n_threads is gone: n_workers=2 steps the rooms in 2 processes")
         source = settings.get("pose_source")

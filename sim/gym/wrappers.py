@@ -16,11 +16,10 @@ from gymnasium.wrappers import TransformObservation
 from gymnasium.wrappers.vector import TransformObservation as OfMany
 from numpy.typing import NDArray
 
-from sim.core.checks import whole
 from sim.core.dynamism import Dynamism
 from sim.gym.observation import Observation
 from slam.errors import InvalidValueError
-from slam.shaped import Positive, shaped
+from slam.shaped import Positive, shaped, whole
 
 SECTORS = 36  # of 361 beams: 5 degrees each
 NEAR_M = 4.0  # m, what is farther looks like this far

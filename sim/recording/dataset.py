@@ -9,7 +9,6 @@ from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
-from sim.core.checks import whole
 from sim.core.versions import check_world
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.splits import Split, checked_split, file_of, list_text, part_of
@@ -21,6 +20,7 @@ from sim.world.times_of_day import MOST_SESSIONS
 from slam import bounded, locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import PART, is_part, make_folder, reason, write_text
+from slam.shaped import whole
 
 PLAN = "dataset.json"
 PAGE = "index.html"  # for who looks at it; listed where ``generate`` came as far as that

@@ -12,13 +12,13 @@ from collections.abc import Mapping, Sequence
 from dataclasses import asdict, dataclass, field, fields, replace
 from importlib import metadata
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any, Literal
 
 import numpy as np
+from msgspec import Meta, Struct
 
 from scenes.crowd import crowd_of
 from scenes.scene_file import sha256_of
-from sim.core.checks import number, one_of, within
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
@@ -35,11 +35,13 @@ from slam.bounded import json_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.files import write_text
 from slam.names import NameFromFile
+from slam.shaped import one_of, shaped, within
 
 RECIPE = "recipe.json"
 SCHEMA = 1
 MAX_BYTES = 1 << 16
 MAX_SECONDS = 86_400.0
+Seconds = Annotated[float, Meta(gt=0.0, le=MAX_SECONDS)]
 _AXES = ("motion", "change")
 # Added since the first recipes: without a word where they are None.
 _LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s", "events", "robot",
@@ -106,11 +108,7 @@ class Recipe:
         Seeds(self.seed)
         rates = Dynamism.at(self.dynamism)
         Dynamism.of(rates, self.moving_share, motion=self.motion, change=self.change)
-        number("Recipe.seconds", self.seconds)
-        if not 0.0 < self.seconds <= MAX_SECONDS:
-            raise InvalidValueError(
-                f"Recipe.seconds must be > 0 and at most {MAX_SECONDS:g}, got {self.seconds}"
-            )
+        shaped("Recipe.seconds", self.seconds, Seconds)
         one_of("Recipe.odometry", self.odometry, tuple(PRESETS))
         if self.twin != "":
             one_of("Recipe.twin", self.twin, TWINS)
@@ -279,6 +277,14 @@ class Made:
         return "; ".join(changes)
 
 
+class _File(Struct):
+    schema: Literal[1]
+    recipe: dict[str, Any]
+    recipe_sha256: str
+    made_with: dict[str, Any]
+    result: dict[str, Any]
+
+
 def read_recipe(path: Path) -> Made:
     """Inverse of ``write_recipe``; ``LogFormatError`` that names the file for anything else.
 
@@ -286,23 +292,17 @@ def read_recipe(path: Path) -> Made:
     another version of the world: ``sim.core.versions.check_world`` before it is simulated.
     """
     data = json_of(path, MAX_BYTES, "recipe")
-    wanted = ("schema", "recipe", "recipe_sha256", "made_with", "result")
-    if any(name not in data for name in wanted):
-        raise LogFormatError(path, f"no recipe: expected {', '.join(wanted)}")
-    if data["schema"] != SCHEMA:
-        raise LogFormatError(path, f"recipe of schema {data['schema']!r}, expected {SCHEMA}")
-    parts = [data["recipe"], data["made_with"], data["result"]]
-    if not all(isinstance(part, dict) for part in parts):
-        raise LogFormatError(path, "no recipe: its parts are no objects")
-    unknown = sorted(set(parts[0]) - {f.name for f in fields(Recipe)})
-    if unknown:
-        raise LogFormatError(path, f"unknown key {unknown[0]!r} in the recipe")
-    if isinstance(parts[0].get("scene"), str):
-        parts[0]["scene"] = NameFromFile(parts[0]["scene"], path)
     try:
-        recipe = Recipe(**parts[0])
+        file: _File = shaped("", data, _File)
+        own = file.recipe
+        if unknown := sorted(set(own) - {f.name for f in fields(Recipe)}):
+            raise InvalidValueError(f"unknown key {unknown[0]!r} in the recipe")
+        if isinstance(own.get("scene"), str):
+            own["scene"] = NameFromFile(own["scene"], path)
+        recipe = Recipe(**own)
     except (InvalidValueError, UnknownNameError, TypeError) as error:
         raise LogFormatError(path, f"no recipe: {error}") from error
-    if recipe.sha256 != data["recipe_sha256"]:
+    if recipe.sha256 != file.recipe_sha256:
         raise LogFormatError(path, "damaged: recipe_sha256 is not that of the recipe")
-    return Made(recipe=recipe, made_with=parts[1], result=parts[2], world=world_of(path, data))
+    world = world_of(path, data)
+    return Made(recipe=recipe, made_with=file.made_with, result=file.result, world=world)

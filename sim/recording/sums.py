@@ -40,14 +40,11 @@ class Fault:
 def sha256(path: Path) -> str:
     """Of a file, read in pieces; ``LogFormatError`` when it cannot be read."""
     bounded.check_file(path)
-    digest = hashlib.sha256()
     try:
         with path.open("rb") as file:
-            while block := file.read(1 << 20):
-                digest.update(block)
+            return hashlib.file_digest(file, "sha256").hexdigest()
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
-    return digest.hexdigest()
 
 
 def text_of(sums: Mapping[str, str]) -> str:
@@ -190,15 +187,17 @@ def faults(folder: Path, listed: Mapping[str, str], *, results: bool = True) -> 
 
 def foreign(folder: Path, there: set[str], known: set[str]) -> list[Fault]:
     """Of the names ``there`` those not ``known``; a folder that holds nothing known is one."""
-    ours = {above.as_posix() for name in known for above in PurePosixPath(name).parents}
-    tops = {_top(name, ours) for name in there - known}
+    ours = {".", *(above for name in known for above in _above(name))}
+    # of each the outermost folder above it with nothing of ours, or itself
+    tops = {
+        next((above for above in reversed(_above(name)) if above not in ours), name)
+        for name in there - known
+    }
     return [Fault(kind="foreign", name=top, why=_stranger(folder, top)) for top in sorted(tops)]
 
 
-def _top(name: str, ours: set[str]) -> str:
-    """The outermost folder above ``name`` with nothing of ours, or the name itself."""
-    strange = [above.as_posix() for above in PurePosixPath(name).parents]
-    return next((above for above in reversed(strange) if above not in ours | {"."}), name)
+def _above(name: str) -> list[str]:
+    return [above.as_posix() for above in PurePosixPath(name).parents]
 
 
 def _stranger(folder: Path, name: str) -> str:

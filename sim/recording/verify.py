@@ -3,7 +3,7 @@
 
 import os
 import tempfile
-from collections.abc import Mapping, Sequence
+from collections.abc import Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast
@@ -83,7 +83,10 @@ def check_hashes(folder: Path, planned: Recipe | None = None) -> Finding:
     else must be what it was, metadata.yaml too.
     """
     if folder.is_symlink() or not folder.is_dir():
-        return finding(folder.name, [_absent(folder)])
+        why = "is no folder: foreign" if os.path.lexists(folder) else "is missing"
+        return finding(
+            folder.name, [Fault(kind="incomplete", name=folder.name, why=f"{folder} {why}")]
+        )
     listed, found = listed_in(folder)
     if not listed:
         return finding(folder.name, found)
@@ -96,32 +99,20 @@ def check_hashes(folder: Path, planned: Recipe | None = None) -> Finding:
         return finding(folder.name, found)
     bag = f"{made.recipe.name}.mcap"
     more = (REARRANGED,) if made.recipe.rearranges else ()
-    found += _unlisted(folder, listed, (*_FILES, bag, *more))
+    found += [
+        Fault(kind="damaged", name=name, why=f"{folder / SUMS} does not list {name}")
+        for name in (*_FILES, bag, *more)
+        if name not in listed
+    ]
     if planned is not None and made.recipe != planned:
         why = f"{folder / RECIPE} is not the recipe that is planned for it"
         found.append(Fault(kind="damaged", name=RECIPE, why=why))
     broken = [(fault.kind, fault.name) for fault in found if fault.kind != "foreign"]
     if broken == [("damaged", bag)] and _has_its_messages(folder, made):
-        found = [_repacked(folder, f) if f.name == bag else f for f in found]
+        why = f"{folder / bag} was packed otherwise: same messages, other bytes"
+        again = Fault(kind="same messages", name=bag, why=why)
+        found = [again if fault.name == bag else fault for fault in found]
     return finding(folder.name, found)
-
-
-def _repacked(folder: Path, fault: Fault) -> Fault:
-    why = f"{folder / fault.name} was packed otherwise: same messages, other bytes"
-    return replace(fault, kind="same messages", why=why)
-
-
-def _absent(folder: Path) -> Fault:
-    why = "is no folder: foreign" if os.path.lexists(folder) else "is missing"
-    return Fault(kind="incomplete", name=folder.name, why=f"{folder} {why}")
-
-
-def _unlisted(folder: Path, listed: Mapping[str, str], wanted: Sequence[str]) -> list[Fault]:
-    return [
-        Fault(kind="damaged", name=name, why=f"{folder / SUMS} does not list {name}")
-        for name in wanted
-        if name not in listed
-    ]
 
 
 def _has_its_messages(folder: Path, made: Made) -> bool:

@@ -17,10 +17,9 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.core.checks import number, numbers, whole
 from sim.view import gl
 from slam.errors import InvalidValueError, MissingDependencyError
-from slam.shaped import Positive, shaped
+from slam.shaped import Number, Positive, shaped, whole
 
 PAINT_GROUP = 5  # shadows painted under things
 HIDDEN_GROUPS = (3, 4)  # collision hulls, marks
@@ -118,11 +117,10 @@ class Camera:
         """
         if self._context is None:
             raise InvalidValueError("this Camera is closed")
-        for field, value in zip(("x", "y"), numbers("at", at, 2, "(x m, y m)"), strict=True):
-            number(f"at: {field}", value)
+        shaped("at", at, tuple[Number, Number])
         shaped("far_m", far_m, Positive)
         for field, value in (("azimuth_deg", azimuth_deg), ("down_deg", down_deg)):
-            number(field, value)
+            shaped(field, value, Number)
         self._view.type = mujoco.mjtCamera.mjCAMERA_FREE
         self._view.lookat[:] = (*at, LOOK_AT_M)
         self._view.distance, self._view.azimuth = far_m, azimuth_deg

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The scene that a world begins with: built, and with a crowd in it."""
 
-import math
 from collections.abc import Sequence
 from dataclasses import replace
 from typing import Any
@@ -14,10 +13,10 @@ from scenes.crowd import Crowd, crowd_of, mix
 from scenes.crowd_kinds import with_crowd
 from scenes.scene import Scene
 from sim.actors.rearranging import place_out
-from sim.core.checks import instance, numbers
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from slam.errors import InvalidValueError
+from slam.shaped import Pose, instance, shaped
 
 VISITOR = "visitor"  # their names begin so
 _STREAM = 101  # of a scene's seed, for their clothes; that of its crowd is 100
@@ -69,10 +68,8 @@ def _begun(scene: Scene, start: Sequence[float] | None) -> Scene:
     """The scene with the robot at ``start``, where one is given."""
     if start is None or not scene.movers or scene.movers[-1].kind != "robot":
         return scene
-    x, y, yaw = numbers("start", start, 3, "(x m, y m, heading rad)")
-    if not math.isfinite(x + y + yaw):
-        return scene  # what is wrong is said where the robot is placed
-    return replace(scene, start=(x, y, yaw), initial={**scene.initial, "robot": (x, y, yaw)})
+    pose = shaped("start", start, Pose)
+    return replace(scene, start=pose, initial={**scene.initial, "robot": pose})
 
 
 def with_visitors(scene: Scene, n: int) -> Scene:

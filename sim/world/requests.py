@@ -7,11 +7,10 @@ from typing import Annotated
 
 from msgspec import Meta
 
-from sim.core.checks import Metres, Point, Word
 from sim.world import hands
 from sim.world.hands import MOST_HOLD_S, MOST_SPEED
 from sim.world.world import World
-from slam.shaped import check
+from slam.shaped import Metres, Point, Word, check
 
 
 @dataclass(frozen=True, kw_only=True)

@@ -16,10 +16,9 @@ from msgspec import Meta
 from scenes import SCAN_HEIGHT
 from scenes.scene import Scene, at_scan_height
 from sim.actors.robot import DriveConfig
-from sim.core.checks import word
 from slam.bounded import toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
-from slam.shaped import Table, shaped
+from slam.shaped import Table, Word, shaped
 
 FOLDER = Path(__file__).parents[1] / "robots"
 MOST_BYTES = 1 << 14
@@ -63,7 +62,7 @@ class Mount(Table, frozen=True):
 class RobotFile(Table, frozen=True):
     """The tables of a robot; without its inertia, that of its shape."""
 
-    name: str
+    name: Word
     mass_kg: Annotated[float, Meta(ge=0.1, le=500.0)]
     footprint: Footprint
     drive: Wheels
@@ -138,7 +137,7 @@ def robot_of(given: str | Mapping[str, Any] | Robot) -> Robot:
     circle = foot.shape == "circle"
     by_shape = 0.5 * foot.radius_m**2 if circle else (a**2 + b**2) / 3.0
     return Robot(
-        name=word("robot: name", own.name),
+        name=own.name,
         mass_kg=own.mass_kg,
         inertia_kgm2=own.inertia_kgm2 or own.mass_kg * by_shape,
         half_m=(foot.radius_m,) if circle else (a, b),

@@ -15,13 +15,13 @@ import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
 
 import numpy as np
+from msgspec import Meta
 
 from scenes.assembly import hull_radius
 from scenes.scene_file import changed, tables
-from sim.core.checks import FAR_M, within, word
 from sim.world import hands
 from sim.world.populated import VISITOR
 from sim.world.requests import Kidnap, MoveDoor, Push, carry_out
@@ -30,14 +30,13 @@ from sim.world.world import World
 from slam.bounded import beside, toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.frames import NS_PER_S
+from slam.shaped import Metres, Table, Word, shaped
 
 MOST_EVENTS, MOST_BYTES = 1000, 1 << 18
 MOST_ENTER, MOST_VISITORS = 20, 400  # people, of one event and of all
 RINGS_M, ROUND = (0.9, 1.3, 1.7, 2.1, 2.5, 2.9), 16  # where people enter around a door or a goal
-_KEYS = {
-    "push": {"towards_m", "heading_deg", "speed_mps"}, "open": {"for_s"}, "shut": {"for_s"},
-    "enter": {"by"}, "carry": {"heading_deg"},
-}  # fmt: skip
+_Place = tuple[Metres, Metres]  # beside it no ``Word``: msgspec 0.22 then crashes the collector
+_Degrees = Annotated[float, Meta(ge=-360.0, le=360.0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -54,6 +53,56 @@ class Cue:
 
     at_s: float
     request: Push | MoveDoor | Kidnap | Enter
+
+
+class _Event(Table, frozen=True, kw_only=True):
+    at_s: Annotated[float, Meta(ge=0.0, le=1e6)]
+
+
+class _Push(_Event, frozen=True, kw_only=True):
+    push: Word
+    towards_m: _Place | None = None
+    heading_deg: _Degrees | None = None
+    speed_mps: float = 1.0
+
+    def request(self) -> Push:
+        if self.towards_m is not None and self.heading_deg is not None:
+            raise InvalidValueError("towards_m and heading_deg exclude each other")
+        heading = None if self.heading_deg is None else math.radians(self.heading_deg)
+        return Push(name=self.push, speed=self.speed_mps, heading=heading, towards=self.towards_m)
+
+
+class _Door(_Event, frozen=True, kw_only=True):
+    open: Word | None = None
+    shut: Word | None = None
+    for_s: float = 20.0
+
+    def request(self) -> MoveDoor:
+        name = self.shut if self.open is None else self.open
+        return MoveDoor(opened=self.open is not None, name=name or "", seconds=self.for_s)
+
+
+class _Carry(_Event, frozen=True, kw_only=True):
+    carry: str | _Place
+    heading_deg: _Degrees = 0.0
+
+    def request(self) -> Kidnap:
+        if isinstance(self.carry, str):
+            return Kidnap(goal=self.carry)
+        return Kidnap(pose=(*self.carry, math.radians(self.heading_deg)))
+
+
+class _Enter(_Event, frozen=True, kw_only=True):
+    enter: Annotated[int, Meta(ge=1, le=MOST_ENTER)]
+    by: str | _Place
+
+    def request(self) -> Enter:
+        return Enter(
+            n=self.enter, by=shaped("by", self.by, Word) if isinstance(self.by, str) else self.by
+        )
+
+
+_EVENTS = {"push": _Push, "open": _Door, "shut": _Door, "enter": _Enter, "carry": _Carry}
 
 
 def read_events(path: str | Path) -> list[dict[str, Any]]:
@@ -111,51 +160,14 @@ def cues_of(rows: Sequence[Mapping[str, Any]]) -> tuple[Cue, ...]:
 
 
 def _cue(where: str, row: Mapping[str, Any]) -> Cue:
-    does = [key for key in _KEYS if isinstance(row, Mapping) and key in row]
+    does = [key for key in _EVENTS if isinstance(row, Mapping) and key in row]
     if len(does) != 1:
-        raise InvalidValueError(f"{where} must have one of {', '.join(_KEYS)}, got {row!r:.80}")
-    known = {"at_s", does[0], *_KEYS[does[0]]}
-    unknown = sorted(set(row) - known)
-    if unknown:
-        raise InvalidValueError(
-            f"{where}: {unknown[0]!r:.40} is no field of {does[0]}, "
-            f"known: {', '.join(sorted(known))}"
-        )
-    at_s = within(f"{where}: at_s", row.get("at_s"), 0.0, 1e6)
+        raise InvalidValueError(f"{where} must have one of {', '.join(_EVENTS)}, got {row!r:.80}")
+    event = shaped(where, row, _EVENTS[does[0]])
     try:
-        return Cue(at_s=at_s, request=_request(does[0], row))
+        return Cue(at_s=event.at_s, request=event.request())
     except InvalidValueError as error:
         raise InvalidValueError(f"{where}: {error}") from error
-
-
-def _request(does: str, row: Mapping[str, Any]) -> Push | MoveDoor | Kidnap | Enter:
-    what = row[does]
-    heading_deg = row.get("heading_deg")
-    if heading_deg is not None:
-        within("heading_deg", heading_deg, -360.0, 360.0)
-    heading = None if heading_deg is None else math.radians(heading_deg)
-    if does == "push":
-        towards = None if "towards_m" not in row else _place("towards_m", row["towards_m"])
-        if towards is not None and heading is not None:
-            raise InvalidValueError("towards_m and heading_deg exclude each other")
-        return Push(name=what, speed=row.get("speed_mps", 1.0), heading=heading, towards=towards)
-    if does in ("open", "shut"):
-        return MoveDoor(opened=does == "open", name=what, seconds=row.get("for_s", 20.0))
-    if does == "carry":
-        if isinstance(what, str):
-            return Kidnap(goal=what)
-        return Kidnap(pose=(*_place("carry", what), heading or 0.0))
-    if isinstance(what, bool) or not isinstance(what, int) or not 1 <= what <= MOST_ENTER:
-        raise InvalidValueError(f"enter must be 1 to {MOST_ENTER} people, got {what!r:.60}")
-    by = row.get("by")
-    return Enter(n=what, by=word("by", by) if isinstance(by, str) else _place("by", by))
-
-
-def _place(what: str, value: Any) -> tuple[float, float]:
-    if not isinstance(value, list | tuple) or len(value) != 2:
-        raise InvalidValueError(f"{what} must be a name or [x, y] in m, got {value!r:.60}")
-    x, y = (within(what, number, -FAR_M, FAR_M) for number in value)
-    return x, y
 
 
 def visitors(cues: Sequence[Cue]) -> int:

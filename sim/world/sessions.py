@@ -21,7 +21,6 @@ from scenes.arrangement import MARGIN_M, Places, fits, places_of
 from scenes.builder import LATCH
 from scenes.scene import Mover, Pose, Scene
 from sim.actors.rearranging import ELSEWHERE_M, FAR_M, find_place, is_movable, place_out
-from sim.core.checks import instance, within
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import STREAMS, Seeds
 from sim.core.sight import nobody
@@ -34,6 +33,7 @@ from sim.world.times_of_day import (
     checked,
     time_of,
 )
+from slam.shaped import instance, within
 
 Float = NDArray[np.float64]
 TURNED_RAD = 0.3  # rad, a door turned by less stands as it stood

@@ -5,7 +5,7 @@ from collections.abc import Mapping
 from dataclasses import dataclass
 from typing import Any
 
-from sim.core.checks import whole
+from slam.shaped import whole
 
 MOST_SESSIONS = 50
 DAY_S, HOUR_S = 86_400.0, 3_600.0

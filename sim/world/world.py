@@ -21,7 +21,6 @@ from sim.actors.robot import Drive, DriveConfig
 from sim.actors.rolling import Rolling
 from sim.core import state
 from sim.core.bodies import Bodies
-from sim.core.checks import instance, one_of, within
 from sim.core.contacts import Contact, RobotContacts
 from sim.core.dynamism import Dynamism
 from sim.core.engine import engine, forward, warned
@@ -34,6 +33,7 @@ from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.times_of_day import time_of
 from slam.errors import InvalidValueError, UnstableError
 from slam.frames import LaserSpec
+from slam.shaped import instance, one_of, within
 
 __all__ = ["SUBSTEPS_PER_S", "SUBSTEPS_PER_TICK", "World"]
 

@@ -14,15 +14,18 @@ import math
 import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager, suppress
-from typing import Any
+from dataclasses import fields
+from typing import Annotated, Any, TypeVar
 
 import numpy as np
+from msgspec import Meta, Struct
 from numpy.typing import NDArray
 
-from slam.checked import is_number
+from slam.checked import MOST_NS
 from slam.errors import FAILURES, InvalidValueError, NotFiniteError, SlamFailedError
 from slam.estimate import Estimate, Raster
 from slam.frames import Features, Float, Frame, LaserSpec, Odometry, Scan
+from slam.shaped import NotNegative, shaped
 from slam.trajectory import Trajectory
 
 PROTOCOL, VERSION = "mobilia-slam", 1
@@ -33,7 +36,11 @@ Message = Mapping[str, Any]
 _NO_JSON_NUMBER = re.compile(
     r"(?<=[\[,:\s])([+-]?)(nan|inf)(?:inity)?(?:\([^)]{0,40}\))?(?=[\],}\s])", re.I
 )
-_NUMBERS = {int, float, type(None)}  # as JSON has them; True and False are none
+_Pose = tuple[float | None, float | None, float | None]
+_Nine = Annotated[tuple[float | None, ...], Meta(min_length=9, max_length=9)]
+_Count = Annotated[int, Meta(ge=0)]
+_Stamp = Annotated[int, Meta(ge=-MOST_NS, le=MOST_NS)]
+S = TypeVar("S", bound=Struct)
 
 
 def line(message: Message) -> bytes:
@@ -90,7 +97,7 @@ def frame_line(frame: Frame, known: LaserSpec | None) -> bytes:
         wheels["increment_covariance"] = odometry.increment_covariance.ravel().tolist()
     if odometry.twist is not None:
         wheels["twist"] = odometry.twist.tolist()
-    message: dict[str, Any] = {"type": "frame", "stamp_ns": frame.stamp_ns, "odometry": wheels}
+    message = {"type": "frame", "stamp_ns": frame.stamp_ns, "odometry": wheels}
     if frame.features is not None:
         message["features"] = {
             "points_robot": frame.features.points_robot.tolist(),
@@ -102,9 +109,7 @@ def frame_line(frame: Frame, known: LaserSpec | None) -> bytes:
     if known is None or scan.spec != known:
         message["laser"] = _laser_message(scan.spec)
     if scan.intensities is not None:
-        message["intensities"] = [
-            v if math.isfinite(v) else None for v in scan.intensities.tolist()
-        ]
+        message["intensities"] = _plain(scan.intensities)
     # by hand: json knows no float32, whose digits are a third of the double's
     ranges = np.where(np.isnan(scan.ranges), np.float32(NO_RANGE), scan.ranges)
     ranges[np.isinf(ranges)] = NO_RETURN
@@ -116,16 +121,10 @@ def _float32s(values: NDArray[np.float32]) -> bytes:
 
 
 def _laser_message(spec: LaserSpec) -> dict[str, Any]:
-    return {
-        "n_beams": spec.n_beams,
-        "angle_min": spec.angle_min,
-        "angle_increment": spec.angle_increment,
-        "range_min": spec.range_min,
-        "range_max": spec.range_max,
-        "beam_time_offsets": spec.beam_time_offsets.tolist(),
-        "T_robot_laser": spec.T_robot_laser.tolist(),
-        **({"range_sigma_m": spec.range_sigma_m} if spec.range_sigma_m else {}),
-    }
+    """All that a scanner is, its noise where that is known."""
+    names = [own.name for own in fields(spec) if own.init and own.name != "range_sigma_m"]
+    noise = {"range_sigma_m": spec.range_sigma_m} if spec.range_sigma_m else {}
+    return {**{name: _plain(getattr(spec, name)) for name in names}, **noise}
 
 
 def frame_of(message: Message, known: LaserSpec | None) -> Frame:
@@ -190,27 +189,41 @@ def _plain(value: Any) -> Any:
     return value if value is None or isinstance(value, (bool, int, float, str)) else str(value)
 
 
+class _Estimate(Struct):
+    stamp_ns: int
+    T_map_robot: _Pose
+    covariance: _Nine = (0.0,) * 9
+    converged: bool = True
+    diagnostics: dict[str, Any] = {}
+
+
 def estimate_of(message: Message, stamp_ns: int) -> Estimate:
     """The estimate of the frame at ``stamp_ns``. No covariance means none is claimed: zero."""
-    if message.get("stamp_ns") != stamp_ns or isinstance(message["stamp_ns"], bool):
-        raise SlamFailedError(
-            f"answered for {message.get('stamp_ns')!r:.40} ns instead of {stamp_ns} ns", "bad"
-        )
-    converged, diagnostics = message.get("converged", True), message.get("diagnostics", {})
-    if not isinstance(converged, bool) or not isinstance(diagnostics, dict):
-        raise SlamFailedError("answered a 'converged' that is no truth value, or 'diagnostics' "
-                              "that are no object", "bad")  # fmt: skip
-    covariance = np.zeros(9)
-    if "covariance" in message:
-        covariance = _numbers(message, "covariance", 9)
+    return _estimate(_read(message, _Estimate), stamp_ns)
+
+
+def _estimate(said: _Estimate, stamp_ns: int) -> Estimate:
+    if said.stamp_ns != stamp_ns:
+        raise SlamFailedError(f"answered for {said.stamp_ns} ns instead of {stamp_ns} ns", "bad")
     with _judged():
         return Estimate(
             stamp_ns=stamp_ns,
-            T_map_robot=_numbers(message, "T_map_robot", 3),
-            covariance=covariance.reshape(3, 3),
-            converged=converged,
-            diagnostics=diagnostics,
+            T_map_robot=_floats(said.T_map_robot),
+            covariance=_floats(said.covariance).reshape(3, 3),
+            converged=said.converged,
+            diagnostics=said.diagnostics,
         )
+
+
+def _read(message: Message, kind: type[S]) -> S:
+    """An answer of that kind; null is NaN, as several JSON writers have it."""
+    with _judged():
+        found: S = shaped("", message, kind)
+    return found
+
+
+def _floats(values: Sequence[float | None]) -> Float:
+    return np.array(values, dtype=np.float64)
 
 
 @contextmanager
@@ -221,21 +234,6 @@ def _judged(not_finite: str = "nan") -> Iterator[None]:
     except (InvalidValueError, OverflowError) as error:
         outcome = not_finite if isinstance(error, NotFiniteError) else "bad"
         raise SlamFailedError(f"answered: {error}", outcome) from error
-
-
-def _numbers(message: Message, key: str, length: int | None = None) -> Float:
-    """A list of numbers; null is NaN, as several JSON writers have it."""
-    values = message.get(key)
-    if not isinstance(values, Sequence) or isinstance(values, str):
-        raise SlamFailedError(f"answered a {key!r} that is no list: {values!r:.60}", "bad")
-    if length is not None and len(values) != length:
-        raise SlamFailedError(f"answered {len(values)} numbers as {key!r}, not {length}", "bad")
-    if not set(map(type, values)) <= _NUMBERS:  # a map has millions
-        raise SlamFailedError(f"answered a {key!r} that holds no numbers: {values!r:.60}", "bad")
-    try:
-        return np.array(values, dtype=np.float64)
-    except OverflowError as error:
-        raise SlamFailedError(f"answered a number in {key!r} past all doubles", "bad") from error
 
 
 def map_message(raster: Raster | None) -> bytes:
@@ -256,27 +254,39 @@ def map_message(raster: Raster | None) -> bytes:
     return head[:-2] + b',"values":[' + _float32s(values.ravel()) + b"]}\n"
 
 
+class _Map(Struct):
+    width: _Count
+    height: _Count
+    resolution_m: float
+    T_map_origin: _Pose
+    values: list[float | None]
+
+
 def map_of(message: Message) -> Raster | None:
     """The map of an answer."""
     if message.get("values") is None:
         return None
-    height, width = message.get("height"), message.get("width")
-    if type(height) is not int or type(width) is not int or min(height, width) < 0:
-        raise SlamFailedError(f"answered a map of {width!r:.20} x {height!r:.20} cells", "bad")
-    if height * width > MAX_CELLS:
+    said: _Map = _read(message, _Map)
+    cells = said.width * said.height
+    if cells > MAX_CELLS:
         raise SlamFailedError(
-            f"answered a map of {width!r:.20} x {height!r:.20} cells; it may have {MAX_CELLS}: "
+            f"answered a map of {said.width} x {said.height} cells; it may have {MAX_CELLS}: "
             "make its cells larger", "bad",
         )  # fmt: skip
-    values = _numbers(message, "values", height * width)
+    _check_count("values", said.values, cells)
+    values = _floats(said.values)
     values[values == UNKNOWN] = np.nan
-    resolution_m = message.get("resolution_m")
-    if not is_number(resolution_m):
-        raise SlamFailedError(f"answered a map of resolution {resolution_m!r:.40}", "bad")
-    origin = _numbers(message, "T_map_origin", 3)
     with _judged("bad"), np.errstate(over="ignore"):  # past float32 is outside [0, 1], too
-        cells = values.astype(np.float32).reshape(height, width)
-        return Raster(values=cells, resolution_m=float(resolution_m), T_map_origin=origin)
+        return Raster(
+            values=values.astype(np.float32).reshape(said.height, said.width),
+            resolution_m=said.resolution_m,
+            T_map_origin=_floats(said.T_map_origin),
+        )
+
+
+def _check_count(what: str, values: Sequence[object], wanted: int) -> None:
+    if len(values) != wanted:
+        raise SlamFailedError(f"answered {len(values)} {what}, not {wanted}", "bad")
 
 
 def trajectory_message(trajectory: Trajectory) -> dict[str, Any]:
@@ -288,14 +298,20 @@ def trajectory_message(trajectory: Trajectory) -> dict[str, Any]:
     }
 
 
+class _Trajectory(Struct):
+    stamps_ns: list[_Stamp]
+    poses: list[float | None]
+
+
 def trajectory_of(message: Message) -> Trajectory:
     """The final poses of an answer."""
-    stamps = message.get("stamps_ns")
-    if not isinstance(stamps, list) or any(type(s) is not int for s in stamps):
-        raise SlamFailedError("answered a trajectory whose 'stamps_ns' are no whole numbers", "bad")
-    poses = _numbers(message, "poses", 3 * len(stamps)).reshape(-1, 3)
+    said: _Trajectory = _read(message, _Trajectory)
+    _check_count("numbers as 'poses'", said.poses, 3 * len(said.stamps_ns))
     with _judged():
-        return Trajectory(stamps_ns=np.array(stamps, dtype=np.int64), poses=poses)
+        return Trajectory(
+            stamps_ns=np.array(said.stamps_ns, dtype=np.int64),
+            poses=_floats(said.poses).reshape(-1, 3),
+        )
 
 
 def at_end_message(estimates: Sequence[Estimate], spent_s: Sequence[float]) -> dict[str, Any]:
@@ -307,17 +323,15 @@ def at_end_message(estimates: Sequence[Estimate], spent_s: Sequence[float]) -> d
     }
 
 
+class _AtEnd(Struct):
+    estimates: list[_Estimate]
+    processor_s: list[NotNegative]
+
+
 def at_end_of(message: Message, stamps_ns: Sequence[int]) -> list[tuple[Estimate, float]]:
     """The estimates of an answer, one for each of ``stamps_ns`` in order, and their times, s."""
-    estimates = message.get("estimates")
-    if not isinstance(estimates, list) or len(estimates) != len(stamps_ns):
-        raise SlamFailedError(
-            f"answered 'estimates' that are no list of {len(stamps_ns)}, one for each frame", "bad"
-        )
-    if not all(isinstance(one, dict) for one in estimates):
-        raise SlamFailedError("answered 'estimates' that are no objects", "bad")
-    spent_s = _numbers(message, "processor_s", len(stamps_ns))
-    if not (np.isfinite(spent_s) & (spent_s >= 0.0)).all():
-        raise SlamFailedError("answered 'processor_s' that are no times, finite and >= 0", "bad")
-    read = [estimate_of(one, at) for one, at in zip(estimates, stamps_ns, strict=True)]
-    return list(zip(read, spent_s.tolist(), strict=True))
+    said: _AtEnd = _read(message, _AtEnd)
+    _check_count("estimates, one for each frame", said.estimates, len(stamps_ns))
+    _check_count("times as 'processor_s'", said.processor_s, len(stamps_ns))
+    read = [_estimate(one, at) for one, at in zip(said.estimates, stamps_ns, strict=True)]
+    return list(zip(read, said.processor_s, strict=True))

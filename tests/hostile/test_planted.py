@@ -9,7 +9,7 @@ import socket
 import stat
 import sys
 from collections.abc import Callable, Iterator
-from contextlib import contextmanager, suppress
+from contextlib import chdir, contextmanager, suppress
 from pathlib import Path
 
 import numpy as np
@@ -52,7 +52,7 @@ def plant(kind: str, place: Path, outside: Path) -> None:
     if kind == "pipe":
         os.mkfifo(place)
     elif kind == "socket":
-        with socket.socket(socket.AF_UNIX) as made, inside(place.parent):
+        with socket.socket(socket.AF_UNIX) as made, chdir(place.parent):
             made.bind(place.name)  # a short name: the path of a socket has 107 bytes at most
     elif kind == "device":
         try:
@@ -63,16 +63,6 @@ def plant(kind: str, place: Path, outside: Path) -> None:
         to = {"file": outside / "notes.txt", "folder": outside / "folder", "loop": place,
               "missing": outside / "new", "null": Path("/dev/null")}  # fmt: skip
         place.symlink_to(to[kind])
-
-
-@contextmanager
-def inside(folder: Path) -> Iterator[None]:
-    before = os.getcwd()
-    os.chdir(folder)
-    try:
-        yield
-    finally:
-        os.chdir(before)
 
 
 @pytest.fixture
@@ -262,11 +252,9 @@ GENERATE = "generate arena --seed 1 --seconds 0.1 --out out"
 @pytest.mark.parametrize(
     ("words", "name", "kind"),
     [
-        (COMPARE, "recordings", "folder"), (COMPARE, "runs", "folder"), (COMPARE, ".lock", "pipe"),
-        (COMPARE, ".lock.workers", "file"), (COMPARE, "index.html", "file"),
+        (COMPARE, "recordings", "folder"), (COMPARE, ".lock.workers", "file"),
         ("report out", "report.html", "file"), ("report out --replays", "replays", "folder"),
-        ("report out", ".lock", "pipe"), (GENERATE, ".lock", "pipe"),
-        (GENERATE, "dataset.json", "missing"), (GENERATE, "arena-d0.5-s0001", "folder"),
+        (GENERATE, ".lock", "pipe"), (GENERATE, "dataset.json", "missing"),
         ("drive arena --slam odometry --seeds 1 --out out", "runs", "folder"),
         ("benchmark --quick --slam odometry --tracks tour-guide --out out", "tour-guide", "folder"),
         ("lifelong --scene arena --sessions 2 --out out", ".lock", "pipe"),

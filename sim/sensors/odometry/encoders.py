@@ -23,12 +23,12 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.core import state
-from sim.core.checks import instance
 from sim.sensors.odometry.config import PRESETS, OdometryConfig, preset
 from sim.sensors.odometry.motion import COUNTED, NOW, over_scan, update
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Odometry
+from slam.shaped import instance
 
 Float = NDArray[np.float64]
 

@@ -102,7 +102,7 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "schema": (lambda d: d.update(schema=2), "of schema 3"),
     "what": (lambda d: d.update(what="a recipe"), "no results of the benchmark"),
     "name": (lambda d: submitted(d, name="../x"), "name must be up to 40"),
-    "no name": (lambda d: submitted(d, name=""), "name must be a name"),
+    "no name": (lambda d: submitted(d, name=""), "name must be a word"),
     "slam": (lambda d: submitted(d, slam="a\nb"), "slam must be"),
     "seconds": (lambda d: submitted(d, seconds=-1), "seconds must be"),
     "huge seconds": (lambda d: submitted(d, seconds=HUGE), "seconds must be"),
@@ -133,9 +133,9 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "no tracking": (lambda d: cell(d, "error_tracking_m", None), "error_tracking_m must be a n"),
     "share": (lambda d: cell(d, "silent_share", 1.5), "silent_share must be"),
     "huge scans": (lambda d: cell(d, "scans", HUGE), "scans must be"),
-    "lost, finished": (lambda d: cell(d, "lost_at_s", 3.0), "lost_at_s must be null where it"),
+    "lost, finished": (lambda d: cell(d, "lost_at_s", 3.0), "lost_at_s must be None"),
     "finished, lost": (lambda d: cell(d, "outcome", "lost"), "lost must be"),
-    "made_with of words": (lambda d: d.update(made_with="me"), "made_with must be an object"),
+    "made_with of words": (lambda d: d.update(made_with="me"), "made_with must be a table"),
     "no made_with": (lambda d: d.pop("made_with"), "made_with"),
 }
 

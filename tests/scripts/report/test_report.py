@@ -168,7 +168,7 @@ DRIVE = '{"command": "drive", "settings": {"drive_schema": 1, "loop": {"plan_on"
     ("name", "content", "says"),
     [("recipe.json", "{}", "lacks command, which must be drive"),
      ("recipe.json", DRIVE.replace("1", "2"), "no closed-loop drive of schema 1"),
-     ("recipe.json", DRIVE, "settings.loop must be a mapping with"),
+     ("recipe.json", DRIVE, "settings.loop.plan_on must be one of layout, map"),
      ("levels.csv", "scene,dynamism\n", "a table without the column 'slam'"),
      ("levels.csv", "scene,slam\na,b\n", "a table without the column 'dynamism'")],
 )  # fmt: skip

@@ -12,18 +12,17 @@ import pytest
 import typer
 
 from scripts import results
-from scripts.film.footage import open_run
-from scripts.output import locked_folder, together, write_recipe
+from scripts.output import write_recipe
 from scripts.report.page import REPORT
 from scripts.verbs.verify import verify
 from scripts.whole_folder import whole_folder
-from sim.recording.dataset import Plan, read_plan, writing
+from sim.recording.dataset import read_plan, writing
 from sim.recording.episode import record
-from sim.recording.recipe import RECIPE, Recipe
+from sim.recording.recipe import RECIPE
 from sim.recording.sums import SUMS, add_to_sums, check_vouched, read_sums, write_sums
-from sim.recording.verify import METADATA, STATUS, Finding, check_bag
+from sim.recording.verify import METADATA, check_bag
 from slam import locks
-from slam.errors import InvalidValueError, LogFormatError, OutputError
+from slam.errors import LogFormatError, OutputError
 from tests.scripts.robustness.samples import (
     COMPARED,
     made,
@@ -61,20 +60,15 @@ def status(path: Path) -> int:
     return 0
 
 
-def test_every_damage_of_a_dataset_is_noticed(dataset):
-    assert missed_by_verify("dataset", dataset, 60, seed=1) == []
-
-
-@pytest.mark.parametrize("name", ["map", "raster", "drive"])
-def test_every_damage_of_other_results_is_noticed(name, tmp_path):
-    folder = made(name, tmp_path / name)
-    assert missed_by_verify(name, folder, 21, seed=2) == []
+@pytest.mark.parametrize(
+    ("name", "count"),
+    [("dataset", 60), ("comparison", 24), ("map", 21), ("raster", 21), ("drive", 21)],
+)
+def test_every_damage_is_noticed_or_made_good(name, count, tmp_path, request):
+    there = name in ("dataset", "comparison")
+    folder = request.getfixturevalue(name) if there else made(name, tmp_path / name)
+    assert missed_by_verify(name, folder, count, seed=1) == []
     assert misread(name, folder, 3, seed=3) == []
-
-
-def test_every_damage_of_a_comparison_is_noticed_or_made_good(comparison):
-    assert missed_by_verify("comparison", comparison, 24, seed=4) == []
-    assert misread("comparison", comparison, 3, seed=5) == []
 
 
 def append(name: str, text: str = "x") -> Callable[[Path], object]:
@@ -131,22 +125,18 @@ def in_other_words(change: Callable[[str], str], name: str = SUMS) -> Callable[[
         (append("dataset.json", "\n"), 1, "dataset.json: damaged"),
         (append(SUMS, "\n"), 1, "SHA256SUMS:21: no hash"),
         (in_other_words(lambda text: text[:-1]), 1, "not as it was written"),
-        (in_other_words(str.upper), 1, "no hash and file name"),
         (in_other_words(lambda text: text.replace("  a", " *a")), 1, "no hash and file name"),
         (in_other_words(lambda t: "\n".join(t.splitlines()[::-1]) + "\n"), 1, "not as it was"),
         (in_other_words(lambda t: t.replace('"seed": 0', '"seed": 1'), "dataset.json"), 1, "SUMS"),
-        (drop_line(SUMS, f"{EPISODES[0]}/map.pgm"), 1, "does not list"),
         (drop_line(f"{EPISODES[0]}/{SUMS}", "map.pgm"), 1, "does not list map.pgm"),
         (relisted, 1, "is not what"),
         (swapped, 1, "not the recipe that is planned"),
         (lambda folder: shutil.rmtree(folder / EPISODES[1]), 3, f"{EPISODES[1]} is missing"),
         (lambda folder: (folder / EPISODES[0] / "map.pgm").unlink(), 3, "map.pgm is missing"),
         (lambda folder: (folder / EPISODES[0] / SUMS).unlink(), 3, "No such file"),
-        (lambda folder: (folder / "dataset.json").unlink(), 3, "dataset.json: cannot be read"),
         (lambda folder: (folder / SUMS).unlink(), 3, "SHA256SUMS: cannot be read"),
         (linked, 3, "is no folder"),
         (append("notes.txt"), 4, "notes.txt is foreign"),
-        (append(f"{EPISODES[0]}/.hidden"), 4, ".hidden is foreign"),
         (append(locks.LOCK), 4, ".lock is left of a run that was killed"),
         (lambda folder: (folder / ".a-d1.host.1.part").mkdir(), 4, "was killed"),
         (lambda folder: (folder / EPISODES[0] / "empty").mkdir(), 4, "empty is foreign"),
@@ -159,17 +149,6 @@ def test_words_and_status_say_what_is_wrong(copied, capsys, change, code, words)
     assert status(copied) == code
     printed = capsys.readouterr()
     assert words in (printed.out + printed.err).replace("\n", "")
-
-
-def test_the_worst_status_wins(copied, dataset):
-    append("notes.txt")(copied)
-    assert status(copied) == 4
-    (copied / EPISODES[0] / "map.yaml").unlink()
-    assert status(copied) == 3
-    append(f"{EPISODES[1]}/relations.txt")(copied)
-    assert status(copied) == 1
-    assert status(dataset) == 0
-    assert Finding(episode="a", verdict="same messages").status == STATUS["same messages"] == 5
 
 
 def test_other_bytes_of_the_same_messages_are_no_excuse_for_the_rest(copied):
@@ -189,8 +168,10 @@ def test_other_bytes_of_the_same_messages_are_no_excuse_for_the_rest(copied):
     shutil.copy(packed, episode / packed.name)
     assert (verdicts(copied), status(copied)) == ({"same messages"}, 5)
     check_bag(episode)
-    append("notes.txt")(copied)
+    append("notes.txt")(copied)  # the worst counts
     assert status(copied) == 4
+    (copied / EPISODES[1] / "map.yaml").unlink()
+    assert status(copied) == 3
     append(f"{EPISODES[0]}/{METADATA}", "\n")(copied)
     assert status(copied) == 1
     with pytest.raises(LogFormatError, match="mcap: damaged"):
@@ -228,7 +209,7 @@ def test_the_sums_of_a_dataset_are_those_of_sha256sum(dataset):
     "change",
     [
         {"episodes": 10**9},
-        {"dynamisms": [0.1 * k / 10**4 for k in range(10**4)], "episodes": 10**4},
+        {"dynamisms": [0.001 * k for k in range(1001)], "episodes": 1000},
         {"dynamisms": 3},
         {"episodes": "2"},
         {"schema": 2},
@@ -242,12 +223,6 @@ def test_a_plan_that_cannot_be_is_refused(copied, change):
     with pytest.raises(LogFormatError, match=r"dataset\.json"):
         read_plan(copied)
     assert "damaged" in verdicts(copied)
-
-
-def test_a_plan_of_too_many_episodes_is_refused():
-    recipe = Recipe(scene="arena", seed=0, dynamism=0.0, seconds=1.0)
-    with pytest.raises(InvalidValueError, match="at most"):
-        Plan(recipe=recipe, dynamisms=tuple(np.linspace(0, 1, 1001)), episodes=1000)
 
 
 def test_a_flipped_recording_and_a_torn_entry_are_made_again(comparison, tmp_path, capsys):
@@ -273,22 +248,6 @@ def test_a_flipped_recording_and_a_torn_entry_are_made_again(comparison, tmp_pat
     assert REPORT in read_sums(folder)
 
 
-def test_a_folder_that_grows_is_vouched_for_when_its_tables_are_in_place(tmp_path):
-    out = tmp_path / "out"
-    with locked_folder(out, "compare"):
-        write_recipe(out, "compare", {})
-        assert "incomplete" in verdicts(out)
-        (out / "kept.npz").write_bytes(b"a job's result")
-        with together(out) as staged:
-            write_recipe(staged, "compare", {"more": 1})
-    assert set(read_sums(out)) == {RECIPE, "kept.npz"}
-    before = (out / SUMS).read_bytes()
-    with pytest.raises(TypeError), locked_folder(out, "compare"), together(out) as staged:
-        write_recipe(staged, "compare", {"more": object()})
-    assert (out / SUMS).read_bytes() == before  # and all that it lists is as it was
-    assert check_vouched(out / RECIPE) is None
-
-
 def test_a_result_within_a_comparison_is_one_of_its_own(comparison, tmp_path):
     folder = Path(shutil.copytree(comparison, tmp_path / "compared"))
     with whole_folder(folder / "within", overwrite=False) as part:
@@ -301,18 +260,6 @@ def test_a_result_within_a_comparison_is_one_of_its_own(comparison, tmp_path):
     assert status(folder) == 1
 
 
-def test_a_file_that_is_vouched_for_is_read_only_as_it_was(tmp_path):
-    with whole_folder(tmp_path / "run", overwrite=False) as part:
-        write_recipe(part, "run", {"seed": 0})
-    recipe = tmp_path / "run" / RECIPE
-    check_vouched(recipe)
-    recipe.write_text(recipe.read_text().replace("0", "1"))
-    with pytest.raises(LogFormatError, match="damaged"):
-        check_vouched(recipe)
-    add_to_sums(recipe)
-    check_vouched(recipe)
-
-
 def test_a_damaged_list_does_not_let_a_changed_file_pass(tmp_path):
     """A line with another name is of no file, and its own file has no line: that is no leave."""
     with whole_folder(tmp_path / "run", overwrite=False) as part:
@@ -320,6 +267,7 @@ def test_a_damaged_list_does_not_let_a_changed_file_pass(tmp_path):
             (part / name).write_text(name)
         write_recipe(part, "run", {"seed": 0})
     recipe, sums = tmp_path / "run" / RECIPE, tmp_path / "run" / SUMS
+    check_vouched(recipe)
     recipe.write_text(recipe.read_text().replace("0", "1"))
     rng, whole = np.random.default_rng(7), sums.read_bytes()
     line = whole.index(b"recipe.json") - 66
@@ -338,6 +286,8 @@ def test_a_damaged_list_does_not_let_a_changed_file_pass(tmp_path):
     sums.write_bytes(whole)
     (tmp_path / "run" / "mine.txt").write_text("mine")
     check_vouched(tmp_path / "run" / "mine.txt")  # nobody lists it, and nothing is lost
+    add_to_sums(recipe)
+    check_vouched(recipe)
 
 
 def test_one_episode_is_checked_and_made_again_by_any_name(copied, monkeypatch, capsys):
@@ -354,14 +304,6 @@ def test_names_in_a_list_cannot_lead_elsewhere_or_write_to_the_terminal(copied):
         (copied / SUMS).write_text(f"{'0' * 64}  {name}\n")
         with pytest.raises(LogFormatError, match="no hash and file name"):
             read_sums(copied)
-
-
-def test_an_episode_without_its_recipe_is_no_log(copied):
-    (copied / EPISODES[0] / RECIPE).unlink()
-    with pytest.raises(LogFormatError, match=r"recipe\.json: cannot be read"):
-        open_run(copied / EPISODES[0], view=None)
-    with open_run(copied / EPISODES[1] / f"{EPISODES[1]}.mcap", view=None) as footage:
-        assert footage.slam == ""
 
 
 def test_a_folder_of_nothing_of_ours_is_refused(tmp_path):

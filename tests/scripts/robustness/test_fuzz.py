@@ -3,7 +3,7 @@
 
 import math
 import re
-from collections.abc import Callable
+from collections.abc import Iterator
 from contextlib import suppress
 from functools import cache
 from typing import Any
@@ -44,15 +44,6 @@ def extreme(rng: Rng) -> float:
     return float(one_of(rng, SIZES)) * float(rng.choice([-1.0, 1.0]))
 
 
-def allowed(make: Callable[[], Any]) -> Any:
-    """What ``make`` gives, tried until the type allows it."""
-    while True:
-        try:
-            return make()
-        except MobiliaError:
-            continue
-
-
 def spec(rng: Rng) -> LaserSpec:
     n = int(one_of(rng, (1, 2, 3, 5, 90, 361, 1081)))
     turn = math.tau / n
@@ -68,50 +59,38 @@ def spec(rng: Rng) -> LaserSpec:
 
 
 def covariance(rng: Rng, n: int) -> Any:
-    if rng.random() < 0.3:
-        return np.full((n, n), abs(extreme(rng)))  # fully correlated
-    return np.diag(one_of(rng, ([1e-4] * n, [abs(extreme(rng)) for _ in range(n)])))
+    flat = np.full((n, n), abs(extreme(rng)))  # fully correlated
+    return one_of(rng, (flat, np.eye(n) * 1e-4, np.diag([abs(extreme(rng)) for _ in range(n)])))
 
 
-def frames(rng: Rng) -> list[Frame]:
+def frames(rng: Rng) -> Iterator[Frame]:
     """A short stream; the scanner and what is sensed may change in the middle."""
     step = int(one_of(rng, (1, 26_666_667, 10**9, 10**18)))
     first = int(one_of(rng, (0, 1_700_000_000 * 10**9, -LAST_NS - 1, LAST_NS - 3 * step, -step)))
-    stamps = [first + k * step for k in range(6)]
-    if rng.random() < 0.3:
-        stamps[int(rng.integers(6))] = one_of(rng, (stamps[0], LAST_NS, 0, 2**70))
-    laser, before, out = allowed(lambda: spec(rng)), np.zeros(3), []
-    for stamp_ns in stamps:
-        if rng.random() < 0.1:
-            laser = allowed(lambda: spec(rng))
-        try:
-            before = allowed_pose(rng, stamp_ns, before)
-            stated = one_of(rng, (None, covariance(rng, 3)))
-            odometry = Odometry(stamp_ns=stamp_ns, T_odom_robot=before, increment_covariance=stated)
+    laser, here = LaserSpec(n_beams=90, angle_min=0.0, angle_increment=0.05), np.zeros(3)
+    for k in range(6):
+        stamp_ns = one_of(rng, (first + k * step,) * 18 + (first, LAST_NS))
+        with suppress(MobiliaError):  # what no frame can have
+            laser = spec(rng) if rng.random() < 0.3 else laser
+            far = rng.random() < 0.15
+            ahead = np.array([extreme(rng), 0.0, extreme(rng)]) if far else rng.normal(0, 0.1, 3)
+            odometry = Odometry(
+                stamp_ns=stamp_ns,
+                T_odom_robot=here + ahead,
+                increment_covariance=one_of(rng, (None, covariance(rng, 3))),
+            )
+            here = odometry.T_odom_robot
             flat = one_of(rng, (np.nan, np.inf, 0.0, laser.range_min, 1.0, 1e-40, 3e38))
             ranges = one_of(rng, (np.full(laser.n_beams, flat), rng.uniform(0, 9, laser.n_beams)))
             scan = Scan(stamp_ns=stamp_ns, ranges=ranges.astype(np.float32), spec=laser)
-            k = int(one_of(rng, (0, 1, 2, 30)))
+            n = int(one_of(rng, (0, 1, 2, 30)))
             seen = Features(
                 stamp_ns=stamp_ns,
-                points_robot=one_of(rng, (rng.uniform(-9, 9, (k, 2)), np.full((k, 2), 1e9))),
-                covariances=np.array([covariance(rng, 2) for _ in range(k)]).reshape(k, 2, 2),
+                points_robot=one_of(rng, (rng.uniform(-9, 9, (n, 2)), np.full((n, 2), 1e9))),
+                covariances=np.array([covariance(rng, 2) for _ in range(n)]).reshape(n, 2, 2),
             )
             given = one_of(rng, ({"scan": scan}, {"scan": scan}, {"features": seen}, {}))
-            out.append(Frame(stamp_ns=stamp_ns, odometry=odometry, **given))
-        except MobiliaError:  # what no frame can have
-            continue
-    return out
-
-
-def allowed_pose(rng: Rng, stamp_ns: int, before: Any) -> Any:
-    step = np.array([rng.normal(0.0, 0.1) for _ in range(3)])
-    if rng.random() < 0.15:
-        step = np.array([one_of(rng, (900.0, 1001.0, 5e-324, extreme(rng))), 0.0, extreme(rng)])
-    with np.errstate(over="ignore"):
-        pose = before + step
-    Odometry(stamp_ns=stamp_ns, T_odom_robot=pose)
-    return pose
+            yield Frame(stamp_ns=stamp_ns, odometry=odometry, **given)
 
 
 @cache

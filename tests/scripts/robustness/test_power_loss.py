@@ -6,7 +6,9 @@ So the order of the calls is what is held here.
 """
 
 import os
+from collections.abc import Callable
 from pathlib import Path
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,27 +27,18 @@ Calls = list[tuple[str, str]]
 def calls(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Calls:
     """Every fsync and rename below ``tmp_path`` in order: what, and of whom (or to which name)."""
     seen: Calls = []
-    fsync, replace, swap = os.fsync, os.replace, files.exchange
 
-    def told(what: str, path: object) -> None:
-        name = os.path.relpath(str(path), tmp_path).replace(f".{os.getpid()}", "")
-        seen.append((what, name))
+    def told(what: str, call: Callable[..., Any]) -> Callable[..., Any]:
+        def telling(*of: Any) -> Any:
+            path = os.readlink(f"/proc/self/fd/{of[0]}") if what == "sync" else str(of[1])
+            seen.append((what, os.path.relpath(path, tmp_path).replace(f".{os.getpid()}", "")))
+            return call(*of)
 
-    def synced(number: int) -> None:
-        told("sync", os.readlink(f"/proc/self/fd/{number}"))
-        fsync(number)
+        return telling
 
-    def renamed(old: Path, new: Path) -> None:
-        told("rename", new)
-        replace(old, new)
-
-    def exchanged(old: Path, new: Path) -> bool:
-        told("rename", new)
-        return swap(old, new)
-
-    monkeypatch.setattr(os, "fsync", synced)
-    monkeypatch.setattr(os, "replace", renamed)
-    monkeypatch.setattr(files, "exchange", exchanged)
+    monkeypatch.setattr(os, "fsync", told("sync", os.fsync))
+    monkeypatch.setattr(os, "replace", told("rename", os.replace))
+    monkeypatch.setattr(files, "exchange", told("rename", files.exchange))
     return seen
 
 

@@ -174,10 +174,10 @@ def test_a_step_of_several_scans_ends_with_the_episode():
 @pytest.mark.parametrize(
     ("settings", "message"),
     [
-        ({"goal": "anywhere"}, "goal must be 'random' or"),
-        ({"goal": (1.0,)}, "goal must be 'random' or"),
-        ({"goal": (math.nan, 0.0)}, "goal must be finite"),
-        ({"goal": (1e9, 0.0)}, "goal must lie within 10000 m"),
+        ({"goal": "anywhere"}, "goal must be random or 2 values"),
+        ({"goal": (1.0,)}, "goal must be random or 2 values"),
+        ({"goal": (math.nan, 0.0)}, r"goal\[0\] must be a number"),
+        ({"goal": (1e9, 0.0)}, r"goal\[0\] must be a number from -10000 to 10000"),
         ({"reward": "dense"}, "reward must be one of progress, sparse, shaped"),
         ({"reward": 3}, "reward must be one of"),
         ({"frame_skip": 0}, "frame_skip must be a whole number from 1"),

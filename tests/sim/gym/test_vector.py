@@ -102,7 +102,7 @@ def test_wrong_settings_are_refused():
         make().reset(seed=[1, 2])
     with pytest.raises(InvalidValueError, match="when making the environments"):
         make().reset(seed=1, options={"resolution_deg": 1.0})
-    with pytest.raises(InvalidValueError, match="unknown reset option 'gaol'"):
+    with pytest.raises(InvalidValueError, match="unknown key 'gaol'"):
         make().reset(seed=1, options={"gaol": 1})
 
 

@@ -40,7 +40,7 @@ def rooms():
 
 def test_errors_and_objects_come_from_workers_as_from_here(rooms):
     here = MobiliaVectorEnv(3, autoreset_mode="same_step", frames=True, **SHORT)
-    for options, words in ({"gaol": 1}, "unknown reset option 'gaol'"), ({"goal": (99, 0)}, "goal"):
+    for options, words in ({"gaol": 1}, "unknown key 'gaol'"), ({"goal": (99, 0)}, "goal"):
         for many in (rooms, here):
             with pytest.raises(InvalidValueError, match=words):
                 many.reset(seed=1, options=options)

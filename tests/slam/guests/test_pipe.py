@@ -73,7 +73,7 @@ def test_a_good_guest_comes_through_and_starts_anew(stream):
         ("terminal", "raised", "\\x1b]0;owned\\x07\\x9b2J\\u202e=1+1"),
         ("other", "bad", "answered 'map' where 'estimate' was expected"),
         ("nan", "nan", "must be finite"),
-        ("short", "bad", "1 numbers as 'T_map_robot', not 3"),
+        ("short", "bad", "T_map_robot must be 3 values"),
         ("stamp", "bad", "answered for 1 ns instead of"),
     ],
 )
@@ -278,13 +278,16 @@ def test_a_program_over_files_that_failed_at_a_scan_is_not_run(own, stream, monk
     assert (len(track.online()), track.durations_s) == (0, [])
 
 
+AT = {"stamp_ns": 5, "T_map_robot": [0.0, 0.0, 0.0]}
+
+
 @pytest.mark.parametrize(
     ("answer", "words"),
     [
-        ({"estimates": [], "processor_s": []}, "no list of 1"),
-        ({"estimates": [7], "processor_s": [0.0]}, "no objects"),
-        ({"estimates": [{"stamp_ns": 5}], "processor_s": [-1.0]}, "no times"),
-        ({"estimates": [{"stamp_ns": 6}], "processor_s": [0.0]}, "answered for 6 ns"),
+        ({"estimates": [], "processor_s": []}, "answered 0 estimates"),
+        ({"estimates": [7], "processor_s": [0.0]}, "must be a table, got 7"),
+        ({"estimates": [AT], "processor_s": [-1.0]}, "must be a finite number >= 0"),
+        ({"estimates": [{**AT, "stamp_ns": 6}], "processor_s": [0.0]}, "answered for 6 ns"),
     ],
 )
 def test_what_a_program_says_at_the_end_is_judged(answer, words):

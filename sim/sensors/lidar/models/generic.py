@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A scanner of no make: ``scanner(fov_deg=270, beams=541, rate_hz=20, sigma_m=0.01)``."""
 
-from sim.core.checks import number, whole
 from sim.sensors.lidar.registry import register
 from sim.sensors.lidar.scanner import MAX_BEAMS, Band, Scanner
 from slam.errors import InvalidValueError
+from slam.shaped import Number, shaped, whole
 
 
 @register("scanner")
@@ -34,8 +34,8 @@ def scanner(  # noqa: PLR0913 (settings of a model)
     Raises ``InvalidValueError`` that names the setting, its value and what was expected.
     """
     whole("scanner: beams", beams, 2, MAX_BEAMS)
-    number("scanner: fov_deg", fov_deg)
-    number("scanner: sigma_m", sigma_m)
+    shaped("scanner: fov_deg", fov_deg, Number)
+    shaped("scanner: sigma_m", sigma_m, Number)
     if not 0.0 < fov_deg <= 360.0:
         raise InvalidValueError(f"scanner: fov_deg must be > 0 and at most 360, got {fov_deg}")
     step_deg = fov_deg / (beams if fov_deg == 360.0 else beams - 1)
