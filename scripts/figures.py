@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Still figures: trajectories, errors and map of a run; what all curves against a level share."""
 
+import html
+import io
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,6 +37,7 @@ _TICKS = (  # up to which ratio of the ends which multiples of a power of ten ar
     (math.inf, (1.0,)),
 )
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_GLYPHS = ("●", "■", "▲", "◆", "▼", "✚", "✖")
 Point = tuple[float, float, float, float]
 """x, value, and the ends of its interval; NaN for what is not there."""
 Margins = tuple[float, float, float, float]
@@ -41,6 +45,15 @@ LINEAR_DEG = 1.0  # degrees about 0 where the axis of the heading error is linea
 _LOOK: dict[str, Any] = {
     "font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
     "axes.spines.right": False, "figure.constrained_layout.use": True,
+}  # fmt: skip
+INK, MUTED, _RULE = "#20242c", "#6b7280", "#d9dce1"
+SVG: dict[str, Any] = {  # what is different in the figures that lie in a page
+    "font.family": "sans-serif", "axes.labelsize": 9.0, "axes.titlesize": 9.5,
+    "axes.titleweight": "bold", "axes.titlelocation": "left", "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK, "text.color": INK, "xtick.color": MUTED, "ytick.color": MUTED,
+    "axes.linewidth": 0.7, "axes.grid.axis": "y", "grid.color": _RULE, "grid.linewidth": 0.6,
+    "grid.alpha": 1.0, "axes.axisbelow": True, "legend.frameon": False,
+    "figure.constrained_layout.use": False, "svg.fonttype": "none", "svg.hashsalt": "mobilia",
 }  # fmt: skip
 _SPARE = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#59616e", "#b8418f", "#5d8a1e", "#3b2f7d",
           "#a0583c", "#2f9fd0")  # fmt: skip
@@ -67,6 +80,11 @@ def styled(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
 def marker(slam: str, slams: Sequence[str]) -> str:
     """One marker per SLAM, for those who print in black or see colours otherwise."""
     return _MARKERS[list(slams).index(slam) % len(_MARKERS)]
+
+
+def glyph(slam: str, slams: Sequence[str]) -> str:
+    """That marker as a letter."""
+    return _GLYPHS[list(slams).index(slam) % len(_GLYPHS)]
 
 
 def apart(slam: str, slams: Sequence[str], levels: Sequence[float]) -> float:
@@ -107,6 +125,27 @@ def save(figure: Figure, path: Path) -> None:
     with replacing(path) as temporary:
         # savefig would draw a figure with a layout twice
         FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
+
+
+def svg(figure: Figure, title: str) -> str:
+    """The figure as an ``<svg>`` element: scales with the page, its text is text.
+
+    Made, drawn and written under ``styled(SVG)``.
+    """
+    figure.patch.set_alpha(0.0)
+    written = io.StringIO()
+    figure.savefig(written, format="svg", metadata={"Date": None, "Creator": None})
+    text = written.getvalue()
+    text = text[text.index("<svg") :].rstrip()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
+    return text.replace("<svg ", f'<svg role="img" aria-label="{html.escape(title)}" ', 1)
+
+
+def remark(ax: Axes, y: float, words: str, tint: str) -> None:
+    """Small words at the right end of a horizontal line, outside."""
+    ax.annotate(words, (1.0, y), xycoords=("axes fraction", "data"), xytext=(3, 0),
+                textcoords="offset points", va="center", color=tint, fontsize=8)  # fmt: skip
 
 
 def _axes(

@@ -21,9 +21,9 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.markup import escape
 from rich.table import Table as Printed
-from rich.text import Text
 
 from scripts.console import fact, say
+from scripts.pages.table import of_printed
 from sim.recording.sums import SUMS, add_to_sums
 from slam.files import write_text
 
@@ -54,25 +54,6 @@ ABOUT: dict[str, str] = {  # what each file is, in the order in which they are l
     "SHA256SUMS": "hashes of all files, for mobilia verify",
 }  # fmt: skip
 LISTED = 24  # files of a kind beyond these are counted
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cell:
-    """``text`` with ``small`` print after it; ``mark`` is "better", "worse", "best" or ""."""
-
-    text: str
-    small: str = ""
-    mark: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """``slams`` are the heads that name one, for its colour; the first column names the row."""
-
-    caption: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[Cell]]
-    slams: Sequence[str] = field(default_factory=tuple)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -133,15 +114,6 @@ def tell(folder: Path, page: Page) -> None:
 def command(*words: object) -> str:
     """A command line of ``mobilia``, to be copied."""
     return shlex.join(["mobilia", *map(str, words)])
-
-
-def of_printed(table: Printed) -> Table:
-    """A table of the console for a page."""
-    columns = [[Text.from_markup(str(c)).plain for c in one.cells] for one in table.columns]
-    rows = [[Cell(text=text) for text in row] for row in zip(*columns, strict=True)]
-    head = [Text.from_markup(str(one.header)).plain for one in table.columns]
-    caption = Text.from_markup(str(table.title or "")).plain
-    return Table(caption=caption, head=head, rows=rows)
 
 
 @cache

@@ -2,8 +2,7 @@
 """A comparison's tables, looked up by scene, level and SLAM, and what may be said of them."""
 
 import os
-from collections import Counter
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,6 +13,7 @@ from scripts.comparison.folder import Compared, read
 from scripts.comparison.run_file import RunFile
 from scripts.comparison.schema import LEVELS, PAIRED, RUNS
 from scripts.comparison.tables import Row
+from scripts.metrics.table import METRICS, Metric
 from scripts.names import DATASET
 from scripts.output import RECIPE, read_recipe_words
 from slam.errors import LogFormatError, MissingPathError
@@ -87,6 +87,10 @@ class Study:
         """Whether any SLAM has that number."""
         return any(row["metric"] == metric for row in self.compared.levels)
 
+    def measures(self, keys: Iterable[str]) -> list[Metric]:
+        """Those metrics that any SLAM has."""
+        return [METRICS[key] for key in keys if self.has(key)]
+
     @cached_property
     def _by_pair(self) -> dict[tuple[str, float, str, str, str], Row]:
         found = {}
@@ -107,14 +111,6 @@ class Study:
             for row in self.compared.runs
             if (row["scene"], row["dynamism"], row["slam"]) == (scene, dynamism, slam)
         ]
-
-    def outcomes(self, scene: str, slam: str) -> Counter[str]:
-        """How its runs ended."""
-        return Counter(
-            row["outcome"]
-            for row in self.compared.runs
-            if (row["scene"], row["slam"]) == (scene, slam)
-        )
 
     @cached_property
     def least_runs(self) -> int:
