@@ -120,7 +120,7 @@ def command(*words: object) -> str:
 def template(name: str, folder: Path = HERE) -> jinja2.Template:
     """A template of ``folder``, which may extend or import those here."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader([folder, HERE]), autoescape=True,
+        loader=jinja2.FileSystemLoader([folder, HERE]), autoescape=jinja2.select_autoescape(),
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.filters["parts"] = lambda name: re.findall(r"[^:/_.]*[:/_.]?", name)[:-1]

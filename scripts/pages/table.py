@@ -3,7 +3,7 @@
 
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, field
-from typing import Any
+from typing import Any, Literal
 
 from rich.markup import escape
 from rich.table import Table as Printed
@@ -13,6 +13,7 @@ from scripts import marks
 from scripts.console import plain_table
 
 NONE = "–"  # where there is no number
+_STYLES = {"better": "green", "worse": "red"}  # by the mark of a cell
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -29,24 +30,33 @@ class Cell:
 
 @dataclass(frozen=True, kw_only=True)
 class Table:
-    """``slams`` are the heads that name one, for its colour; the first column names the row."""
+    """``slams`` are the heads that name one, for its colour; the first column names the row.
+
+    words  so many columns at the left are words, the others numbers
+    """
 
     caption: str
     head: Sequence[str]
     rows: Sequence[Sequence[Cell]]
     slams: Sequence[str] = field(default_factory=tuple)
+    words: int = 1
 
-    def markdown(self, *, left: int = 1) -> str:
-        """Its lines, small print in brackets; the first ``left`` columns are words."""
-        return marks.table(self.head, [[*map(str, row)] for row in self.rows], left=left)
+    def markdown(self) -> str:
+        """Its lines, small print in brackets."""
+        return marks.table(self.head, [[*map(str, row)] for row in self.rows], left=self.words)
 
-    def printed(self) -> Printed:
-        """For the console, small print in brackets; numbers to the right."""
+    def printed(self, *, ruled: bool = False) -> Printed:
+        """For the console, small print in brackets; ``ruled``: with rules between the columns."""
         found = plain_table(self.caption)
+        if ruled:
+            found = Printed(title=escape(self.caption), title_justify="left")
         for k, heading in enumerate(self.head):
-            found.add_column(escape(heading), justify="right" if k else "left", overflow="fold")
+            side: Literal["left", "right"] = "left" if k < self.words else "right"
+            found.add_column(
+                escape(heading), justify=side, overflow="ellipsis" if ruled else "fold"
+            )
         for row in self.rows:
-            found.add_row(*(escape(str(cell)) for cell in row))
+            found.add_row(*(Text(str(cell), _STYLES.get(cell.mark, "")) for cell in row))
         return found
 
 
@@ -80,5 +90,5 @@ def of_printed(table: Printed) -> Table:
     return Table(caption=_plain(table.title or ""), head=head, rows=rows)
 
 
-def _plain(markup: object) -> str:
-    return Text.from_markup(str(markup)).plain
+def _plain(of: object) -> str:
+    return of.plain if isinstance(of, Text) else Text.from_markup(str(of)).plain
