@@ -22,7 +22,7 @@ from sim.events import Event
 from sim.view import draw
 from sim.view.draw import Color, Picture
 from sim.view.moment import SIGMAS, Moments, Shown
-from sim.view.scans import LEGEND, beams
+from sim.view.scans import LEGEND
 from slam import se2
 from slam.estimate import Raster
 from slam.frames import Float, Frame, Scan
@@ -80,17 +80,12 @@ class Show:
         """What the filmed system has estimated so far."""
         return self.moments.track
 
-    @property
-    def colors(self) -> dict[str, Color]:
-        """What each track is drawn in, and "truth"."""
-        return draw.colors_of(list(self.replay.tracks))
-
     def named(self) -> list[tuple[str, Color]]:
         """Whose colour is which: the tracks, then the truth where there is one."""
         names = {name: name for name in self.replay.tracks}
         if self.shown is not None and self.shown.truth_map is not None and self.truth_name:
             names["truth"] = self.truth_name
-        return [(_short(word), self.colors[name]) for name, word in names.items()]
+        return [(_short(word), self.moments.colors[name]) for name, word in names.items()]
 
     def legend(self) -> list[tuple[str, Color]]:
         """The same for a strip, with what the colours of the beams say."""
@@ -102,14 +97,12 @@ class Show:
         """(k, 2) m, what the last scan saw where the primary track believes it was."""
         if self.shown is None or self.shown.frame.scan is None:
             return np.zeros((0, 2))
-        T_robot_laser, ends, _ = beams(self.shown.frame)
-        here = self.shown.estimates[self.primary].T_map_robot
-        return se2.transform(se2.compose(here, T_robot_laser), ends)
+        return self.shown.scan_map(self.shown.own.T_map_robot)[0]
 
     def note(self, frame: Frame) -> Shown:
         """Remember this frame's poses and errors; call for every frame, painted or not."""
         self.shown = shown = self.moments.note(frame, self.stage.placed)
-        here = shown.estimates[self.primary]
+        here = shown.own
         if frame.scan is not None and shown.seconds - self._seen_s >= SEEN_EVERY_S - 1e-9:
             self._seen_s = shown.seconds
             self.seen.add(frame.scan, here.T_map_robot)
@@ -175,10 +168,10 @@ class _Panes:
         self._layout, unit = layout, layout.unit
         stage.open(layout)
         self._map = MapPane(*layout.map.size, unit, stage.bounds)
-        self._close = CloseUp(layout.close.size, unit, show.colors[show.primary])
+        self._close = CloseUp(layout.close.size, unit, show.moments.colors[show.primary])
         span = (pace.from_s, max(min(pace.to_s, show.duration_s), pace.from_s + 1.0))
         self._chart = ErrorChart(
-            layout.chart.size, unit, span_s=span, primary=show.primary, colors=show.colors,
+            layout.chart.size, unit, span_s=span, primary=show.primary, colors=show.moments.colors,
             lanes=[*stage.lanes, UNSURE],
         )  # fmt: skip
         self._base = self._still()
@@ -187,25 +180,24 @@ class _Panes:
 
     def paint(self, frame: Frame) -> Picture:
         show, layout, moments = self._show, self._layout, self._show.moments
-        shown, T_view_map = show.shown, self._T_view_map()
+        shown, T_view_map, colors = show.shown, self._T_view_map(), moments.colors
         assert shown is not None
         fresh = (
             show.pace.fps * FRESH_S <= 1.0  # scans come when they come: some early by a part
             or abs(shown.seconds - self._fresh_at) >= FRESH_S * show.pace.speed - 1e-6
         )
-        own, paths = moments.paths[show.primary], moments.paths
         if fresh:
             self._fresh_at = shown.seconds
             raster, landmarks = moments.look(big_rest_s=show.duration_s / MOST_MAPS)
-            self._map.refresh(raster, landmarks, own, T_view_map)
+            self._map.refresh(raster, landmarks, moments.paths[show.primary], T_view_map)
         canvas = self._base.copy()
         self._headline(canvas, shown.seconds)
-        names = [name for name in paths if name != show.primary]
-        if shown.truth_map is None:
-            names.remove("truth")
-        drawn = [(paths[n], show.colors[n], 4 if n == "truth" else 2) for n in names]
-        drawn.append((own, show.colors[show.primary], 2))
-        covariance = shown.estimates[show.primary].covariance
+        drawn = [
+            (path, colors[name], 4 if name == "truth" else 2)
+            for name, path in sorted(moments.paths.items(), key=lambda one: one[0] == show.primary)
+            if name != "truth" or shown.truth_map is not None
+        ]
+        covariance = shown.own.covariance
         picture = self._map.paint(drawn, show.last_points_map, covariance, T_view_map)
         _put(canvas, layout.map, picture)
         _put(canvas, layout.scan, show.stage.scan(frame))
@@ -243,7 +235,7 @@ class _Panes:
     def _close_up(self, canvas: Picture, shown: Shown, covariance: Float) -> None:
         """The last centimetres, and how far off in words."""
         T, box, unit = self._T_view_map(), self._layout.close, self._layout.unit
-        own, turn = shown.estimates[self._show.primary].T_map_robot, se2.rotation(float(T[2]))
+        own, turn = shown.own.T_map_robot, se2.rotation(float(T[2]))
         truth = None if shown.truth_map is None else se2.compose(T, shown.truth_map)
         turned = turn @ covariance[:2, :2] @ turn.T
         _put(canvas, box, self._close.paint(se2.compose(T, own), truth, turned))

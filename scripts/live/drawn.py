@@ -15,7 +15,6 @@ from sim.view import draw
 from sim.view.draw import Color
 from sim.view.moment import Moments, Path, Shown, ellipse
 from sim.view.parts import BOX, Parts, Placed, mesh
-from sim.view.scans import beams
 from sim.world.world import World
 from slam import se2
 from slam.estimate import Landmarks, Raster
@@ -49,7 +48,6 @@ class Drawn:
         self.parts = None if world is None else Parts(world.scene, world.model)
         self._height_m = 0.0 if world is None else world.scene.scan_height_m
         self.bounds = LOG_BOUNDS if world is None else world.scene.bounds
-        self._colors = draw.colors_of(list(moments.replay.tracks))
         self._nodes: dict[str, Any] = {}
         self._values: dict[str, Any] = {}
         self._placed: Placed | None = None
@@ -78,10 +76,8 @@ class Drawn:
             self._landmarks(shown.landmarks)
         renew = abs(shown.seconds - self._path_s) >= PATH_S
         self._path_s = shown.seconds if renew else self._path_s
-        for name, estimate in shown.estimates.items():
-            self._track(name, estimate.T_map_robot, estimate.covariance)
-        if shown.truth_map is not None:
-            self._track("truth", shown.truth_map, None)
+        for name, (pose, covariance) in shown.robots().items():
+            self._track(name, pose, covariance)
         if renew:
             for name, path in self.moments.paths.items():
                 self._path(name, path, shown.number)
@@ -116,15 +112,12 @@ class Drawn:
 
     def _scan(self, shown: Shown) -> None:
         """Where beams ended: where the robot truly is, in a log where it is believed to be."""
-        here = shown.truth_map
-        if here is None:
-            here = shown.estimates[self.moments.primary].T_map_robot
-        mounted, xy, rgb = beams(shown.frame)
+        here = shown.own.T_map_robot if shown.truth_map is None else shown.truth_map
+        xy, rgb = shown.scan_map(here)
         # a slow page moves nodes at once and points later: where they lie, points say, and of few m
         near = np.round(np.r_[here[:2], 0.0] / NEAR_M) * NEAR_M
         wxyz, position = _pose(near, self._height_m + LIFT_M)
-        xy = se2.transform(se2.compose(here, mounted), xy) - near[:2]
-        points = np.column_stack([xy, np.zeros(len(xy))]).astype(np.float16)
+        points = np.column_stack([xy - near[:2], np.zeros(len(xy))]).astype(np.float16)
         if "scan" in self._nodes:
             self._set("scan", points=points, colors=rgb, position=position)
             return
@@ -164,7 +157,7 @@ class Drawn:
 
     def _track(self, name: str, pose: Float, covariance: Float | None) -> None:
         """A robot as an arrow, with its ellipse."""
-        (wxyz, position), color = _pose(pose), self._colors[name]
+        (wxyz, position), color = _pose(pose), self.moments.colors[name]
         if name not in self._nodes:
             node = f"/map/{_node(name)}"
             self._nodes[name] = self._scene.add_frame(
@@ -184,7 +177,7 @@ class Drawn:
     def _path(self, name: str, path: Path, number: int) -> None:
         way = _segments(path.points(PATH_POINTS, number))
         if len(way):
-            self._lines(f"path/{name}", way, self._colors[name], 0.03)
+            self._lines(f"path/{name}", way, self.moments.colors[name], 0.03)
 
     def _lines(self, name: str, segments: Float, color: Color, wide_m: float) -> None:
         segments = np.round(segments, 3).astype(np.float32)
