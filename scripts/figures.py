@@ -40,7 +40,6 @@ _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
 _GLYPHS = ("●", "■", "▲", "◆", "▼", "✚", "✖")
 Point = tuple[float, float, float, float]
 """x, value, and the ends of its interval; NaN for what is not there."""
-Margins = tuple[float, float, float, float]
 LINEAR_DEG = 1.0  # degrees about 0 where the axis of the heading error is linear
 _LOOK: dict[str, Any] = {
     "font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
@@ -149,19 +148,18 @@ def remark(ax: Axes, y: float, words: str, tint: str) -> None:
 
 
 def _axes(
-    width: float, height: float, rows: int = 1, margins: Margins | None = None
+    width: float, height: float, margins: tuple[float, float, float, float], rows: int = 1
 ) -> tuple[Figure, NDArray[np.object_]]:
-    """``margins``: inches left, right, below and above; else found again by measuring all words,
-    which takes a third of the time of a picture."""
-    with mpl.rc_context({"figure.constrained_layout.use": margins is None}):
+    """``margins``: inches left, right, below and above, which saves the third of the time of a
+    picture that it takes to measure all words."""
+    left, right, below, above = margins
+    with mpl.rc_context({"figure.constrained_layout.use": False}):
         figure = Figure(figsize=(width, height))
     axes = np.atleast_1d(figure.subplots(rows, 1, sharex=rows > 1))
-    if margins is not None:
-        left, right, below, above = margins
-        figure.subplots_adjust(
-            left=left / width, right=1.0 - right / width, bottom=below / height,
-            top=1.0 - above / height, hspace=0.1,
-        )  # fmt: skip
+    figure.subplots_adjust(
+        left=left / width, right=1.0 - right / width, bottom=below / height,
+        top=1.0 - above / height, hspace=0.1,
+    )  # fmt: skip
     return figure, axes
 
 
@@ -175,7 +173,7 @@ def trajectories(
 ) -> None:
     """``tracks`` over the map, all in the frame of the first pose (``truth`` already in it)."""
     beside = 0.6 + 0.085 * max(map(len, [*tracks, truth_name, "start"]))  # of the legend, inches
-    figure, axes = _axes(9.0, 6.0, margins=(0.75, beside, 0.5, 0.3))
+    figure, axes = _axes(9.0, 6.0, (0.75, beside, 0.5, 0.3))
     ax: Axes = axes[0]
     if raster is not None:
         draw_raster(ax, raster)
@@ -209,7 +207,7 @@ def draw_raster(ax: Axes, raster: Raster, **look: Any) -> None:
 @styled()
 def errors(path: Path, tracks: Mapping[str, Trajectory], truth: Trajectory) -> None:
     """Position and heading error over time, unaligned: in the frame of the known first pose."""
-    figure, axes = _axes(9.0, 5.0, rows=2, margins=(0.85, 0.1, 0.5, 0.35))
+    figure, axes = _axes(9.0, 5.0, (0.85, 0.1, 0.5, 0.35), rows=2)
     for name, track in tracks.items():
         stamps, offset, turned = error_series(track, truth)
         color = color_of(name, list(tracks))
@@ -262,7 +260,7 @@ def _over_map(path: Path, raster: Raster, track: Trajectory, title: str) -> Iter
     """Axes to draw the map on, of its shape; the trajectory comes over it, then it is saved."""
     height, width = raster.values.shape
     wide = min(11.0, max(5.0, 5.5 * width / height + 2.0))
-    figure, axes = _axes(wide, 6.5, margins=(0.75, 0.1, 0.75, 0.3))
+    figure, axes = _axes(wide, 6.5, (0.75, 0.1, 0.75, 0.3))
     ax: Axes = axes[0]
     ax.grid(visible=False)
     yield ax

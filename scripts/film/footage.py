@@ -187,24 +187,22 @@ def of_log(
     if mount is not None or flip:
         by = " and ".join(w for w, on in (("--laser", mount is not None), ("--flip", flip)) if on)
         stream = remounted(stream, mount, flip=flip, by=by)
-    first_ns = last_ns = None
-    labelled, frames, empty, tested = False, 0, 0, MountingTest()
+    labelled, stamps_ns, empty, tested = False, list[int](), 0, MountingTest()
     for frame in stream:
         tested.note(frame)
         empty += frame.scan is not None and float(frame.scan.valid.mean()) < FEW_RETURNS
-        first_ns = frame.stamp_ns if first_ns is None else first_ns
-        last_ns, frames = frame.stamp_ns, frames + 1
+        stamps_ns.append(frame.stamp_ns)
         labelled = labelled or frame.labels is not None
-    if first_ns is None or last_ns is None:
+    if not stamps_ns:
         raise InvalidValueError(f"{path}: holds no frame to film")
     return Footage(
         stream=stream,
         stage=Stage(labelled=labelled),
         title=path.resolve().name,
-        duration_s=(last_ns - first_ns) / NS_PER_S,
+        duration_s=(stamps_ns[-1] - stamps_ns[0]) / NS_PER_S,
         truth_name=stream.metadata.truth or "truth",
-        scans=frames,
-        empty=empty / frames,
+        scans=len(stamps_ns),
+        empty=empty / len(stamps_ns),
         tested=tested,
     )
 

@@ -5,8 +5,9 @@ Room and scan lie in the world; map, estimates and paths in the map, which lies 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -31,6 +32,7 @@ LEVELS = 8  # of a cell of it that are told apart
 STEPS_M, STEPS_TURN = 512.0, 1024.0  # parts of a metre and of a turn that are told apart
 LOG_BOUNDS = (-10.0, -10.0, 10.0, 10.0)  # of what is seen of a log at first, m
 AROUND = 9  # corners of a circle as drawn
+_NO_SHADOW = {"cast_shadow": False, "receive_shadow": False}
 _ARROW = np.array([[0.32, 0.0, 0.0], [-0.22, 0.2, 0.0], [-0.1, 0.0, 0.0], [-0.22, -0.2, 0.0]])
 
 
@@ -94,19 +96,14 @@ class Drawn:
                 continue
             centres, quats = parts.poses(batch)
             centres, quats = np.rint(centres * STEPS_M) / STEPS_M, np.rint(quats * STEPS_TURN)
-            quats /= STEPS_TURN
-            name = f"room/{k}_{batch.shape}"
-            if not first:
-                self._set(name, batched_positions=centres, batched_wxyzs=quats)
-                continue
-            vertices, faces = mesh(batch.shape, AROUND)
-            self._nodes[name] = self._scene.add_batched_meshes_simple(
-                f"/{name}", vertices, faces, quats, centres,
+            name, (vertices, faces) = f"room/{k}_{batch.shape}", mesh(batch.shape, AROUND)
+            add = partial(
+                self._scene.add_batched_meshes_simple, f"/{name}", vertices, faces,
                 batched_scales=batch.sizes.astype(np.float32), batched_colors=batch.colors,
                 batched_opacities=batch.opacity if batch.glass else None,
-                flat_shading=batch.shape == BOX, lod="off", cast_shadow=False,
-                receive_shadow=False,
+                flat_shading=batch.shape == BOX, lod="off", **_NO_SHADOW,
             )  # fmt: skip
+            self._put(name, add, batched_positions=centres, batched_wxyzs=quats / STEPS_TURN)
 
     # -- what is measured and estimated ---------------------------------------------------------
 
@@ -118,13 +115,11 @@ class Drawn:
         near = np.round(np.r_[here[:2], 0.0] / NEAR_M) * NEAR_M
         wxyz, position = _pose(near, self._height_m + LIFT_M)
         points = np.column_stack([xy - near[:2], np.zeros(len(xy))]).astype(np.float16)
-        if "scan" in self._nodes:
-            self._set("scan", points=points, colors=rgb, position=position)
-            return
-        self._nodes["scan"] = self._scene.add_point_cloud(
-            "/map/scan", points, rgb, point_size=POINT_M, point_shape="circle",
-            point_shading="flat", wxyz=wxyz, position=position,
+        add = partial(
+            self._scene.add_point_cloud, "/map/scan", point_size=POINT_M, point_shape="circle",
+            point_shading="flat", wxyz=wxyz,
         )  # fmt: skip
+        self._put("scan", add, points=points, colors=rgb, position=position)
 
     def _cells(self, raster: Raster | None) -> None:
         """The map in the colours of the pictures; unknown cells are transparent."""
@@ -142,7 +137,7 @@ class Drawn:
         # a picture's second axis goes down: turned half round its first, it lies on its back
         self._nodes["cells"] = self._scene.add_image(
             "/map/cells", cells, wide, high, wxyz=(0.0, w, z, 0.0), position=position,
-            cast_shadow=False, receive_shadow=False,
+            **_NO_SHADOW,
         )  # fmt: skip
 
     def _landmarks(self, landmarks: Landmarks | None) -> None:
@@ -165,8 +160,7 @@ class Drawn:
             )
             self._scene.add_mesh_simple(
                 f"{node}/arrow", _ARROW + np.array([0.0, 0.0, self._height_m + ROBOT_M]),
-                np.array([[0, 1, 2], [0, 2, 3]]), color=color, side="double", cast_shadow=False,
-                receive_shadow=False,
+                np.array([[0, 1, 2], [0, 2, 3]]), color=color, side="double", **_NO_SHADOW,
             )  # fmt: skip
         self._set(name, wxyz=wxyz, position=position)
         if covariance is not None:
@@ -182,12 +176,17 @@ class Drawn:
     def _lines(self, name: str, segments: Float, color: Color, wide_m: float) -> None:
         segments = np.round(segments, 3).astype(np.float32)
         colors = np.broadcast_to(np.array(color, np.uint8), segments.shape)
+        if len(segments) or name in self._nodes:
+            node = f"/map/{'/'.join(map(_node, name.split('/')))}"
+            add = partial(self._scene.add_line_segments, node, thickness=wide_m)
+            self._put(name, add, points=segments, colors=colors)
+
+    def _put(self, name: str, add: Callable[..., Any], **values: Any) -> None:
+        """Make the node, or tell it what has changed."""
         if name in self._nodes:
-            self._set(name, points=segments, colors=colors)
-        elif len(segments):
-            self._nodes[name] = self._scene.add_line_segments(
-                f"/map/{'/'.join(map(_node, name.split('/')))}", segments, colors, thickness=wide_m
-            )
+            self._set(name, **values)
+        else:
+            self._nodes[name] = add(**values)
 
     def _set(self, name: str, **values: Any) -> None:
         """Tell the node what has changed."""
