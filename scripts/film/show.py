@@ -7,7 +7,8 @@ for frame in replay.run(stream):
     picture = show.paint(frame)        # whenever one is wanted
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -31,6 +32,7 @@ from slam.maps import OCCUPIED_THRESHOLD
 from slam.replay import Replay, Track
 from slam.system import MovingMap
 
+SAME_DOUBT_S = 0.5  # doubts so near each other are one
 SEEN_EVERY_S = 0.2  # the areas of neighbouring scans overlap
 MOST_MAPS = 60  # big ones, of a log
 STRAY = 0.002  # share of what stands, on each side, that a poster may leave out
@@ -64,7 +66,11 @@ class Show:
     _seen_s: float = -SEEN_EVERY_S
     _scans: list[tuple[int, Scan]] = field(default_factory=list)  # that were seen, by frame
     _moved: int = 0
-    _panes: "_Panes | None" = None
+
+    @cached_property
+    def panes(self) -> "_Panes":
+        """Its painters, made with the first picture."""
+        return _Panes(self)
 
     @property
     def replay(self) -> Replay:
@@ -111,14 +117,11 @@ class Show:
         for name in self.replay.tracks:
             self.series.setdefault(name, Series()).add(shown, name)
         if not here.converged:
-            before = self.unsure[-1] if self.unsure else None
-            if before is not None and shown.seconds - before.end_s < 0.5:
-                self.unsure[-1] = replace(before, end_s=shown.seconds)
-            else:
-                doubt = Event(
-                    kind=UNSURE, name="", start_s=shown.seconds, end_s=shown.seconds, seen=True
-                )
-                self.unsure.append(doubt)
+            start_s = end_s = shown.seconds
+            if self.unsure and end_s - self.unsure[-1].end_s < SAME_DOUBT_S:
+                start_s = self.unsure.pop().start_s
+            doubt = Event(kind=UNSURE, name="", start_s=start_s, end_s=end_s, seen=True)
+            self.unsure.append(doubt)
         if self._moved != self.moments.moved:  # what was seen lies elsewhere on the map now
             self._moved, self.seen = self.moments.moved, SeenSpace()
             for (_, scan), pose in zip(self._scans, self._poses(), strict=True):
@@ -127,28 +130,24 @@ class Show:
 
     def paint(self, frame: Frame) -> Picture:
         """The film frame at ``frame``: call ``note`` first. Pictures share no memory."""
-        if self._panes is None:
-            self._panes = _Panes(self)
-        return self._panes.paint(frame)
+        return self.panes.paint(frame)
 
     def poster(self, raster: Raster) -> Picture | None:
         """The last frame, its map framed on what stands in ``raster``; None where the whole room
         is in view anyway, or nothing stands."""
         rows, columns = np.nonzero(raster.values > OCCUPIED_THRESHOLD)
-        if self.shown is None or self._panes is None or self.stage.bounds or not len(rows):
+        if self.shown is None or self.stage.bounds or not len(rows):
             return None
         step, origin = raster.resolution_m, raster.T_map_origin
         # without what few beams met through windows
         xmin, xmax = np.quantile(columns, (STRAY, 1.0 - STRAY)) * step + origin[0]
         ymin, ymax = np.quantile(rows, (STRAY, 1.0 - STRAY)) * step + origin[1]
         bounds = float(xmin), float(ymin), float(xmax) + step, float(ymax) + step
-        return self._panes.framed(self.shown.frame, bounds)
+        return self.panes.framed(self.shown.frame, bounds)
 
     def vignette(self, frame: Frame) -> Picture:
         """The scan above the map, without words: what a strip is made of."""
-        whole = self.paint(frame)
-        assert self._panes is not None
-        return self._panes.vignette(whole)
+        return self.panes.vignette(self.paint(frame))
 
     def _poses(self) -> list[Float]:
         """Where the scans that were seen lie in the map by now."""

@@ -20,6 +20,7 @@ from slam.errors import LogFormatError, MissingPathError
 from slam.shaped import one_of
 
 LEAST_RUNS = 6  # with fewer not even all wins are unlikely enough by chance (sign test, 5 %)
+_SIGNED = ("median_difference", "low", "high")
 WORST = 3  # runs of a scene that the page lists
 
 
@@ -152,21 +153,12 @@ def _badness(row: Row) -> float:
 
 def _turned(row: Row) -> Row:
     """The same pair the other way round."""
-    low, high = row["low"], row["high"]
+    minus = {key: None if row[key] is None else -row[key] for key in _SIGNED}
     return {
-        **row,
-        "slam_a": row["slam_b"],
-        "slam_b": row["slam_a"],
-        "median_difference": _minus(row["median_difference"]),
-        "low": _minus(high),
-        "high": _minus(low),
-        "wins": row["losses"],
-        "losses": row["wins"],
-    }
-
-
-def _minus(value: float | None) -> float | None:
-    return None if value is None else -value
+        **row, "slam_a": row["slam_b"], "slam_b": row["slam_a"], "wins": row["losses"],
+        "losses": row["wins"], "median_difference": minus["median_difference"],
+        "low": minus["high"], "high": minus["low"],
+    }  # fmt: skip
 
 
 def verdict(row: Row, less_is_better: bool) -> int:
