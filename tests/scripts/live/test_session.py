@@ -93,7 +93,9 @@ def test_a_log_is_shown(tmp_path):
     assert shown[-1].seconds == pytest.approx(2.2, abs=1e-3)
     assert shown[-1].placed is None
     assert math.isnan(shown[-1].error("odometry")[0])
-    assert shown[-1].estimates["odometry"].T_map_robot[0] == pytest.approx(0.55)
+    assert shown[-1].own.T_map_robot[0] == pytest.approx(0.55)
+    with pytest.raises(NeedsLabelsError, match=r"made.log has no labels"):
+        Opener(slams=["oracle(shunting)"], path=log).open()
 
 
 def test_a_page_asks_for_another_world_and_keeps_the_seed():
@@ -143,10 +145,3 @@ def test_a_bag_is_shown_with_its_truth_and_labels(tmp_path):
     assert shown[0].frame.labels is not None
     assert shown[-1].truth_map is not None
     assert shown[-1].error("odometry")[0] < 0.05
-
-
-def test_an_oracle_needs_labels(tmp_path):
-    log = tmp_path / "made.log"
-    log.write_text(carmen(3))
-    with pytest.raises(NeedsLabelsError, match=r"made.log has no labels"):
-        Opener(slams=["oracle(shunting)"], path=log).open()
