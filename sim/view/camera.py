@@ -9,6 +9,7 @@ so that it works whatever ``MUJOCO_GL`` was when mujoco was imported. A camera b
 that made it. People between a camera that rides on the robot and the robot are drawn as glass.
 """
 
+import copy
 import importlib
 from typing import Any, Self
 
@@ -213,24 +214,15 @@ def soften(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _make_context(
     model: mujoco.MjModel, width: int, height: int, shadows: bool, samples: int
 ) -> mujoco.MjrContext:
-    """A render context with these qualities; the model is as before afterwards."""
-    changed: list[tuple[Any, str, int]] = [
-        (model.vis.global_, "offwidth", width),
-        (model.vis.global_, "offheight", height),
-        (model.vis.quality, "offsamples", samples),
-    ]
+    """A render context with these qualities."""
+    made_of = copy.copy(model)
+    looks, quality = made_of.vis.global_, made_of.vis.quality
+    looks.offwidth, looks.offheight, quality.offsamples = width, height, samples
     if not shadows:
-        changed.append((model.vis.quality, "shadowsize", 0))
+        quality.shadowsize = 0
     if height <= SMALL:
-        changed += [(model.vis.quality, "numslices", 8), (model.vis.quality, "numstacks", 5)]
-    before = [(owner, field, getattr(owner, field)) for owner, field, _ in changed]
-    for owner, field, value in changed:
-        setattr(owner, field, value)
-    try:
-        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-    finally:
-        for owner, field, value in before:
-            setattr(owner, field, value)
+        quality.numslices, quality.numstacks = 8, 5
+    context = mujoco.MjrContext(made_of, mujoco.mjtFontScale.mjFONTSCALE_100.value)
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, context)
     _sample_one_level(model, context)
     return context
