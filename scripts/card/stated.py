@@ -159,7 +159,7 @@ def _spot_sizes(model: Scanner, distance: float) -> tuple[float, float]:
 
 def _unit(model: Scanner, _: float) -> float:
     """The step of the codes: the largest of which all values sent are multiples."""
-    sent, _ = _ahead(model.only("noise"), 0.5 * model.range_max_m, 20)
+    sent = _ahead(model.only("noise"), 0.5 * model.range_max_m, 20)[0]
     tick = 2.5e-5  # far finer than any code
     codes = np.unique(np.rint(sent[np.isfinite(sent)] / tick).astype(np.int64))
     return float(np.gcd.reduce(np.diff(codes))) * tick

@@ -35,12 +35,16 @@ def _by_measure(
     """
     if len(study.levels) == 1 and having:
         at = study.levels[0]
-        slams = [slam for slam in study.slams if any(slam in own for own in having.values())]
+        having_any = [slam for slam in study.slams if any(slam in own for own in having.values())]
         corner = f"{minus} minus" if minus else "SLAM"
         return [
-            grid(f"{where} at {study.axis} {at:g}", corner, slams, list(having),
+            grid(f"{where} at {study.axis} {at:g}", corner, having_any, list(having),
                  lambda slam, metric: cell(metric, at, slam))
         ]  # fmt: skip
+
+    def of_one(slam: str) -> Callable[[float, Metric], Cell]:
+        return lambda level, metric: cell(metric, level, slam)
+
     found, single = [], dict[str, list[Metric]]()
     for metric, slams in having.items():
         if len(slams) == 1:
@@ -51,10 +55,7 @@ def _by_measure(
         found.append(grid(caption, study.axis, study.levels, slams, own, slams=slams))
     for slam, metrics in single.items():
         caption = f"{minus} minus {slam}" if minus else slam
-        found.append(
-            grid(caption, study.axis, study.levels, metrics,
-                 lambda level, metric, slam=slam: cell(metric, level, slam))
-        )  # fmt: skip
+        found.append(grid(caption, study.axis, study.levels, metrics, of_one(slam)))
     return found
 
 
