@@ -93,8 +93,6 @@ class Camera:
 
         Raises ``InvalidValueError`` for a camera the model does not have.
         """
-        if self._context is None:
-            raise InvalidValueError("this Camera is closed")
         number = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_CAMERA, camera)
         if number < 0:
             known = [self._model.camera(i).name for i in range(self._model.ncam)]
@@ -117,8 +115,6 @@ class Camera:
 
         Raises ``InvalidValueError`` for what is no finite number, and for a ``far_m`` not above 0.
         """
-        if self._context is None:
-            raise InvalidValueError("this Camera is closed")
         for field, value in zip(("x", "y"), numbers("at", at, 2, "(x m, y m)"), strict=True):
             number(f"at: {field}", value)
         shaped("far_m", far_m, Positive)
@@ -131,6 +127,8 @@ class Camera:
         return self._picture(data)
 
     def _picture(self, data: mujoco.MjData) -> NDArray[np.uint8]:
+        if self._context is None:
+            raise InvalidValueError("this Camera is closed")
         mujoco.mj_camlight(self._model, data)
         self._update(data)
         self._gl.make_current()

@@ -180,15 +180,15 @@ class Parts:
         parts: list[tuple[int, float, tuple[float, ...]]],
         owner: NDArray[np.int64],
     ) -> Batch:
-        geoms = np.array([geom for geom, _, _ in parts])
+        geoms, along, sizes = (np.array(column) for column in zip(*parts, strict=True))
         rgba = np.array([self._rgba(geom) for geom in geoms.tolist()])
         return Batch(
             shape=key[0],
             moves=key[1],
             glass=key[2],
             geoms=geoms,
-            along=np.array([along for _, along, _ in parts]),
-            sizes=np.array([size for _, _, size in parts]),
+            along=along,
+            sizes=sizes,
             colors=np.round(255.0 * np.clip(rgba[:, :3], 0.0, 1.0)).astype(np.uint8),
             opacity=rgba[:, 3],
             owners=owner[geoms],
