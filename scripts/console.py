@@ -6,7 +6,7 @@ import sys
 import threading
 import time
 from collections.abc import Callable, Iterator, Sequence
-from contextlib import contextmanager, suppress
+from contextlib import ExitStack, contextmanager, suppress
 from functools import wraps
 from typing import ParamSpec
 
@@ -111,28 +111,29 @@ class Lines(Progress):
 
     def start(self) -> None:
         """Begin to tell, from a thread of its own: a long step does not call anything."""
-        self._ticks = _Ticks(self._tell)
+        self._ticks = ExitStack()
+        self._ticks.enter_context(_ticking(self._tell))
 
     def stop(self) -> None:
         """Tell once more, how it ended."""
-        self._ticks.stop()
+        self._ticks.close()
         self._tell()
 
     def _tell(self) -> None:
         for task in self.tasks:
             if task.visible:
-                _line(_words(task))
+                say(escape(_words(task)), highlight=False)
 
 
 def _words(task: Task) -> str:
     """``office: 400/2250 scans, 12 s so far, about 54 s left``."""
-    done = str(task.fields.get("unit", ""))
+    name, done = Text.from_markup(task.description).plain, str(task.fields.get("unit", ""))
     if task.total is not None and task.completed >= task.total:
-        return f"{_plain(task.description)}: {done or 'done'}, {task.elapsed or 0.0:.0f} s"
+        return f"{name}: {done or 'done'}, {task.elapsed or 0.0:.0f} s"
     left = _left_s(task)
     parts = [done, f"{task.elapsed or 0.0:.0f} s so far"]
     parts += [f"about {in_time(left)} left"] if left else []
-    return f"{_plain(task.description)}: {', '.join(filter(None, parts))}"
+    return f"{name}: {', '.join(filter(None, parts))}"
 
 
 def in_time(seconds: float) -> str:
@@ -159,14 +160,6 @@ class _Left(ProgressColumn):
         return Text(words, style="progress.remaining")
 
 
-def _plain(description: str) -> str:
-    return Text.from_markup(description).plain
-
-
-def _line(words: str) -> None:
-    console.print(escape(words), highlight=False, soft_wrap=True)
-
-
 @contextmanager
 def working(words: str) -> Iterator[None]:
     """For a step that counts nothing: a spinner, or a line every ``LINE_EVERY_S``."""
@@ -175,30 +168,31 @@ def working(words: str) -> Iterator[None]:
             yield
         return
     started = time.monotonic()
-    ticks = _Ticks(lambda: _line(f"{words}: {time.monotonic() - started:.0f} s so far"))
+
+    def tell() -> None:
+        say(escape(f"{words}: {time.monotonic() - started:.0f} s so far"), highlight=False)
+
+    with _ticking(tell):
+        yield
+
+
+@contextmanager
+def _ticking(tell: Callable[[], None]) -> Iterator[None]:
+    """Call ``tell`` every ``LINE_EVERY_S``, first after that time; no call begins after the end."""
+    over = threading.Event()
+
+    def run() -> None:
+        with suppress(OSError):  # nobody reads any more
+            while not over.wait(LINE_EVERY_S):
+                tell()
+
+    thread = threading.Thread(target=run, daemon=True)
+    thread.start()
     try:
         yield
     finally:
-        ticks.stop()
-
-
-class _Ticks:
-    """Calls ``tell`` every ``LINE_EVERY_S``, first after that time, until ``stop``."""
-
-    def __init__(self, tell: Callable[[], None]) -> None:
-        self._tell, self._over = tell, threading.Event()
-        self._thread = threading.Thread(target=self._run, daemon=True)
-        self._thread.start()
-
-    def _run(self) -> None:
-        with suppress(OSError):  # nobody reads any more
-            while not self._over.wait(LINE_EVERY_S):
-                self._tell()
-
-    def stop(self) -> None:
-        """No call begins after this."""
-        self._over.set()
-        self._thread.join()
+        over.set()
+        thread.join()
 
 
 def plain_table(title: str, caption: str | None = None) -> Table:

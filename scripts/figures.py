@@ -1,7 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Still figures: trajectories, errors and map of a run; what all curves against a level share."""
 
+import html
+import io
 import math
+import re
 from collections.abc import Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from pathlib import Path
@@ -34,13 +37,22 @@ _TICKS = (  # up to which ratio of the ends which multiples of a power of ten ar
     (math.inf, (1.0,)),
 )
 _MARKERS = ("o", "s", "^", "D", "v", "P", "X")
+_GLYPHS = ("●", "■", "▲", "◆", "▼", "✚", "✖")
 Point = tuple[float, float, float, float]
 """x, value, and the ends of its interval; NaN for what is not there."""
-Margins = tuple[float, float, float, float]
 LINEAR_DEG = 1.0  # degrees about 0 where the axis of the heading error is linear
 _LOOK: dict[str, Any] = {
     "font.size": 9, "axes.grid": True, "grid.alpha": 0.35, "axes.spines.top": False,
     "axes.spines.right": False, "figure.constrained_layout.use": True,
+}  # fmt: skip
+INK, MUTED, _RULE = "#20242c", "#6b7280", "#d9dce1"
+SVG: dict[str, Any] = {  # what is different in the figures that lie in a page
+    "font.family": "sans-serif", "axes.labelsize": 9.0, "axes.titlesize": 9.5,
+    "axes.titleweight": "bold", "axes.titlelocation": "left", "axes.edgecolor": MUTED,
+    "axes.labelcolor": INK, "text.color": INK, "xtick.color": MUTED, "ytick.color": MUTED,
+    "axes.linewidth": 0.7, "axes.grid.axis": "y", "grid.color": _RULE, "grid.linewidth": 0.6,
+    "grid.alpha": 1.0, "axes.axisbelow": True, "legend.frameon": False,
+    "figure.constrained_layout.use": False, "svg.fonttype": "none", "svg.hashsalt": "mobilia",
 }  # fmt: skip
 _SPARE = ("#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#59616e", "#b8418f", "#5d8a1e", "#3b2f7d",
           "#a0583c", "#2f9fd0")  # fmt: skip
@@ -67,6 +79,11 @@ def styled(changes: Mapping[str, Any] | None = None) -> Iterator[None]:
 def marker(slam: str, slams: Sequence[str]) -> str:
     """One marker per SLAM, for those who print in black or see colours otherwise."""
     return _MARKERS[list(slams).index(slam) % len(_MARKERS)]
+
+
+def glyph(slam: str, slams: Sequence[str]) -> str:
+    """That marker as a letter."""
+    return _GLYPHS[list(slams).index(slam) % len(_GLYPHS)]
 
 
 def apart(slam: str, slams: Sequence[str], levels: Sequence[float]) -> float:
@@ -109,20 +126,40 @@ def save(figure: Figure, path: Path) -> None:
         FigureCanvasAgg(figure).print_png(temporary, metadata={"Software": None})
 
 
+def svg(figure: Figure, title: str) -> str:
+    """The figure as an ``<svg>`` element: scales with the page, its text is text.
+
+    Made, drawn and written under ``styled(SVG)``.
+    """
+    figure.patch.set_alpha(0.0)
+    written = io.StringIO()
+    figure.savefig(written, format="svg", metadata={"Date": None, "Creator": None})
+    text = written.getvalue()
+    text = text[text.index("<svg") :].rstrip()
+    text = re.sub(r"<metadata>.*?</metadata>", "", text, flags=re.DOTALL)
+    text = re.sub(r' (?:width|height)="[\d.]+pt"', "", text, count=2)
+    return text.replace("<svg ", f'<svg role="img" aria-label="{html.escape(title)}" ', 1)
+
+
+def remark(ax: Axes, y: float, words: str, tint: str) -> None:
+    """Small words at the right end of a horizontal line, outside."""
+    ax.annotate(words, (1.0, y), xycoords=("axes fraction", "data"), xytext=(3, 0),
+                textcoords="offset points", va="center", color=tint, fontsize=8)  # fmt: skip
+
+
 def _axes(
-    width: float, height: float, rows: int = 1, margins: Margins | None = None
+    width: float, height: float, margins: tuple[float, float, float, float], rows: int = 1
 ) -> tuple[Figure, NDArray[np.object_]]:
-    """``margins``: inches left, right, below and above; else found again by measuring all words,
-    which takes a third of the time of a picture."""
-    with mpl.rc_context({"figure.constrained_layout.use": margins is None}):
+    """``margins``: inches left, right, below and above, which saves the third of the time of a
+    picture that it takes to measure all words."""
+    left, right, below, above = margins
+    with mpl.rc_context({"figure.constrained_layout.use": False}):
         figure = Figure(figsize=(width, height))
     axes = np.atleast_1d(figure.subplots(rows, 1, sharex=rows > 1))
-    if margins is not None:
-        left, right, below, above = margins
-        figure.subplots_adjust(
-            left=left / width, right=1.0 - right / width, bottom=below / height,
-            top=1.0 - above / height, hspace=0.1,
-        )  # fmt: skip
+    figure.subplots_adjust(
+        left=left / width, right=1.0 - right / width, bottom=below / height,
+        top=1.0 - above / height, hspace=0.1,
+    )  # fmt: skip
     return figure, axes
 
 
@@ -136,7 +173,7 @@ def trajectories(
 ) -> None:
     """``tracks`` over the map, all in the frame of the first pose (``truth`` already in it)."""
     beside = 0.6 + 0.085 * max(map(len, [*tracks, truth_name, "start"]))  # of the legend, inches
-    figure, axes = _axes(9.0, 6.0, margins=(0.75, beside, 0.5, 0.3))
+    figure, axes = _axes(9.0, 6.0, (0.75, beside, 0.5, 0.3))
     ax: Axes = axes[0]
     if raster is not None:
         draw_raster(ax, raster)
@@ -170,7 +207,7 @@ def draw_raster(ax: Axes, raster: Raster, **look: Any) -> None:
 @styled()
 def errors(path: Path, tracks: Mapping[str, Trajectory], truth: Trajectory) -> None:
     """Position and heading error over time, unaligned: in the frame of the known first pose."""
-    figure, axes = _axes(9.0, 5.0, rows=2, margins=(0.85, 0.1, 0.5, 0.35))
+    figure, axes = _axes(9.0, 5.0, (0.85, 0.1, 0.5, 0.35), rows=2)
     for name, track in tracks.items():
         stamps, offset, turned = error_series(track, truth)
         color = color_of(name, list(tracks))
@@ -223,7 +260,7 @@ def _over_map(path: Path, raster: Raster, track: Trajectory, title: str) -> Iter
     """Axes to draw the map on, of its shape; the trajectory comes over it, then it is saved."""
     height, width = raster.values.shape
     wide = min(11.0, max(5.0, 5.5 * width / height + 2.0))
-    figure, axes = _axes(wide, 6.5, margins=(0.75, 0.1, 0.75, 0.3))
+    figure, axes = _axes(wide, 6.5, (0.75, 0.1, 0.75, 0.3))
     ax: Axes = axes[0]
     ax.grid(visible=False)
     yield ax

@@ -20,7 +20,6 @@ from scripts.days.buildings import Buildings
 from scripts.days.scores import Row
 from scripts.jobs import try_names
 from scripts.machine import machine, versions
-from scripts.marks import table
 from scripts.options import whole
 from scripts.output import result_folder
 from scripts.report import score_tables
@@ -101,14 +100,8 @@ def section(rows: Sequence[Row], *, tables: bool = True) -> str:
     for group, own in score_tables.groups(rows).items():
         parts.append(f"### {score_tables.where(group)}: {score_tables.size(own)}")
         parts.append("\n".join(f"- {line}" for line in score_tables.sentences(own)))
-        if not tables:
-            continue
-        heads = ["score", *score_tables.slams_of(own)]
-        lines = [
-            [heading, *(score_tables.both(*cell) for cell in cells)]
-            for heading, cells in score_tables.table(own)
-        ]
-        parts.append(table(heads, lines))
+        if tables:
+            parts.append(score_tables.table(own).markdown())
     return "\n\n".join(parts)
 
 

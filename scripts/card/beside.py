@@ -10,8 +10,8 @@ import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure as Picture
 
-from scripts.card import page
 from scripts.figures import save, styled
+from scripts.pages.table import NONE, Cell, Table
 from sim.driving.pilot import Pilot
 from sim.gym.goals import Ground
 from sim.sensors.lidar.models.lms221 import SCAN_MODES
@@ -104,8 +104,9 @@ def _scans(
             yield frame
 
 
-NONE = "–"
 DIFFERS, AGREES = "≠", "="
+_VERDICTS = {None: "", True: DIFFERS, False: AGREES}
+CAPTION = "value (95 % interval, whole stretches drawn again); ≠: the intervals do not meet"
 COLORS = ("#1f61be", "#168c5a", "#de6e18", "#7a3fb0", "#59616e")
 OURS = "#ce2c3c"
 MARKS = ("s", "^", "D")  # of ours
@@ -127,18 +128,13 @@ def cell(figure: Figure, unit: str) -> str:
     return f"{value} ({low} to {high})" if figure.has_interval else value
 
 
-def headings(real: Cards, ours: Cards) -> list[str]:
-    """Of the columns: each real card is followed by its verdict."""
-    return ["", "unit", *(name for log in real for name in (log, "")), *ours]
-
-
-def rows(real: Cards, ours: Cards, *, details: bool = True) -> list[list[str]]:
+def table(real: Cards, ours: Cards, *, details: bool = True) -> Table:
     """Every statistic that one of the real cards has; ``details``: also range by range.
 
-    Verdicts are against the first of ours: ≠ where the intervals do not meet, = where they do,
-    empty where one of them has none.
+    Each real card is followed by its verdict against the first of ours: ≠ where the intervals do
+    not meet, = where they do, empty where one of them has none.
     """
-    out = []
+    rows = []
     for statistic in STATISTICS:
         mine = [card.figures[statistic.key] for card in ours.values()]
         theirs = [card.figures[statistic.key] for card in real.values()]
@@ -147,16 +143,17 @@ def rows(real: Cards, ours: Cards, *, details: bool = True) -> list[list[str]]:
             continue
         row = [statistic.what, statistic.unit]
         for figure in theirs:
-            verdict = {None: "", True: DIFFERS, False: AGREES}[apart(figure, mine[0])]
-            row += [cell(figure, statistic.unit), verdict]
-        out.append(row + [cell(figure, statistic.unit) for figure in mine])
-    return out
+            row += [cell(figure, statistic.unit), _VERDICTS[apart(figure, mine[0])]]
+        row += [cell(figure, statistic.unit) for figure in mine]
+        rows.append([Cell(text=text) for text in row])
+    head = ["", "unit", *(name for log in real for name in (log, "")), *ours]
+    return Table(caption=CAPTION, head=head, rows=rows, words=len(head))
 
 
-def markdown(real: Cards, ours: Cards) -> list[str]:
-    """The lines of the table without details, then what was there to measure."""
-    lines = page.markdown(headings(real, ours), rows(real, ours, details=False))
-    return [*lines, "", *(f"- {name}: {amount(card)}." for name, card in (real | ours).items())]
+def markdown(real: Cards, ours: Cards) -> str:
+    """The table without details, then what was there to measure."""
+    lines = (f"- {name}: {amount(card)}." for name, card in (real | ours).items())
+    return "\n".join([table(real, ours, details=False).markdown(), "", *lines])
 
 
 def amount(card: ScannerCard) -> str:

@@ -14,6 +14,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.pages.table import Cell
 from sim.sensors.lidar.device import LaserScanner, ScanResult
 from sim.sensors.lidar.link import SerialLink
 from sim.sensors.lidar.models.lms221 import (
@@ -27,7 +28,7 @@ from sim.sensors.lidar.receiver import SignalModel
 from sim.sensors.lidar.registry import ScannerConfig
 
 HEADINGS = ("", "what", "data sheet", "measured", "source")
-MARKS = {True: "✓", False: "✗"}
+MARKS = {True: Cell(text="✓", mark="better"), False: Cell(text="✗", mark="worse")}
 HEIGHT = 0.36
 NONE = RangeEffects.none()
 MATERIALS = ("wall", "paper", "rubber", "metal", "glass", "mirror", "trousers", "plastic_black")
@@ -53,9 +54,9 @@ class Row(NamedTuple):
     source: str
     kept: bool
 
-    def cells(self) -> tuple[str, ...]:
+    def cells(self) -> list[Cell]:
         """Under ``HEADINGS``."""
-        return (MARKS[self.kept], *self[:4])
+        return [MARKS[self.kept], *(Cell(text=text) for text in self[:4])]
 
 
 def box(x: float, y: float, half_x: float, half_y: float, material: str = "wall") -> str:

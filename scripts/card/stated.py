@@ -2,6 +2,7 @@
 """The sensor card of any scanner with a data sheet: what is stated, and what is measured."""
 
 import math
+from collections.abc import Callable
 from dataclasses import replace
 from fractions import Fraction
 
@@ -43,7 +44,8 @@ def _row(model: Scanner, stated: Stated) -> Row:
     if stated.at_m is not None:
         what += f" at {stated.at_m:g} m"
     if stated.value is not None:
-        measured, words = _measured(model, stated)
+        measured = _MEASURES[stated.what](model, stated.at_m or 0.0)
+        words = _printed(stated.what, measured)
         return Row(what, stated.text, words, stated.source, _kept(stated, measured))
     words = "the model has none"
     if stated.what in ("range_min_m", "unit_m") and getattr(model, stated.what):
@@ -61,41 +63,28 @@ def _kept(stated: Stated, measured: float | str) -> bool:
     return math.isclose(measured, stated.value, rel_tol=stated.within or usual)
 
 
-def _measured(model: Scanner, stated: Stated) -> tuple[float | str, str]:
-    """What the simulated scanner does: as a number or a word, and as it is printed."""
-    spec, at = model.spec(), stated.at_m or 0.0
+def _printed(what: str, measured: float | str) -> str:
+    if isinstance(measured, str):
+        return measured
+    suffix, scale = UNIT_OF.get(what.rsplit("_", 1)[-1], ("", 1.0))
+    words = f"{float(f'{scale * measured:.4g}'):g} {suffix}".strip()
+    return f"{words}, worst of {UNITS} units" if what == "systematic_m" else words
+
+
+def _field_of_view(model: Scanner, _: float) -> float:
+    """Degrees; all round, the beam after the last is the first again."""
+    spec = model.spec()
     increment = math.degrees(spec.angle_increment)
-    if stated.what in ("direction", "too_near", "no_return"):
-        word = _word(model, stated.what)
-        return word, word
-    value = {
-        "field_of_view_deg": lambda: (
-            increment * (spec.n_beams - (increment * spec.n_beams < 359.9))
-        ),
-        "n_beams": lambda: float(Bench(plate(3.0), model).scan().ranges.size),
-        "step_deg": lambda: increment,
-        "rate_hz": lambda: _rate(model),
-        "beam_to_beam_us": lambda: 1e6 * float(np.abs(np.diff(spec.beam_time_offsets)).mean()),
-        "range_min_m": lambda: _limit(model, model.range_min_m),
-        "range_max_m": lambda: _limit(model, model.range_max_m),
-        "noise_m": lambda: _noise(model, at),
-        "systematic_m": lambda: _systematic(model, at),
-        "unit_m": lambda: _unit(model),
-        "spot_width_m": lambda: _spot_sizes(model, at)[0],
-        "spot_height_m": lambda: _spot_sizes(model, at)[1],
-    }[stated.what]()
-    suffix, scale = UNIT_OF.get(stated.what.rsplit("_", 1)[-1], ("", 1.0))
-    words = f"{float(f'{scale * value:.4g}'):g} {suffix}".strip()
-    return value, f"{words}, worst of {UNITS} units" if stated.what == "systematic_m" else words
+    return increment * (spec.n_beams - (increment * spec.n_beams < 359.9))
 
 
-def _word(model: Scanner, what: str) -> str:
-    times = model.times_s
-    if what == "direction":
-        return "clockwise" if times[0] > times[-1] else "counter-clockwise"
-    near = plate(0.5 * model.range_min_m, 0.01)
-    bench = Bench(near if what == "too_near" else "", model)
-    sent = str(bench.scan().ranges[_middle(model)])
+def _direction(model: Scanner, _: float) -> str:
+    return "clockwise" if model.times_s[0] > model.times_s[-1] else "counter-clockwise"
+
+
+def _sent(model: Scanner, world: str) -> str:
+    """For the beam ahead, in one scan of a world."""
+    sent = str(Bench(world, model).scan().ranges[_middle(model)])
     return "NaN" if sent == "nan" else sent
 
 
@@ -104,7 +93,7 @@ def _middle(model: Scanner) -> int:
     return int(np.argmin(np.abs(model.spec().angles)))
 
 
-def _rate(model: Scanner) -> float:
+def _rate(model: Scanner, _: float) -> float:
     """Scans over the physics steps that they took, of so many that these are whole."""
     scans = Fraction(model.period_s * STEPS_PER_S).denominator
     bench = Bench(plate(3.0), model)
@@ -168,9 +157,31 @@ def _spot_sizes(model: Scanner, distance: float) -> tuple[float, float]:
     return float(wide), float(high)
 
 
-def _unit(model: Scanner) -> float:
+def _unit(model: Scanner, _: float) -> float:
     """The step of the codes: the largest of which all values sent are multiples."""
-    sent, _ = _ahead(model.only("noise"), 0.5 * model.range_max_m, 20)
+    sent = _ahead(model.only("noise"), 0.5 * model.range_max_m, 20)[0]
     tick = 2.5e-5  # far finer than any code
     codes = np.unique(np.rint(sent[np.isfinite(sent)] / tick).astype(np.int64))
     return float(np.gcd.reduce(np.diff(codes))) * tick
+
+
+# By quantity of a data sheet, what the simulated scanner does: of its model and a distance in m.
+_MEASURES: dict[str, Callable[[Scanner, float], float | str]] = {
+    "direction": _direction,
+    "too_near": lambda model, _: _sent(model, plate(0.5 * model.range_min_m, 0.01)),
+    "no_return": lambda model, _: _sent(model, ""),
+    "field_of_view_deg": _field_of_view,
+    "n_beams": lambda model, _: float(Bench(plate(3.0), model).scan().ranges.size),
+    "step_deg": lambda model, _: math.degrees(model.spec().angle_increment),
+    "rate_hz": _rate,
+    "beam_to_beam_us": lambda model, _: (
+        1e6 * float(np.abs(np.diff(model.spec().beam_time_offsets)).mean())
+    ),
+    "range_min_m": lambda model, _: _limit(model, model.range_min_m),
+    "range_max_m": lambda model, _: _limit(model, model.range_max_m),
+    "noise_m": _noise,
+    "systematic_m": _systematic,
+    "unit_m": _unit,
+    "spot_width_m": lambda model, at_m: _spot_sizes(model, at_m)[0],
+    "spot_height_m": lambda model, at_m: _spot_sizes(model, at_m)[1],
+}

@@ -56,8 +56,8 @@ def main(arguments: Sequence[str] | None = None) -> None:
     one, half = real_cards(wanted.data, LOGS_1_DEG), real_cards(wanted.data, LOGS_HALF_DEG)
     ours_one, ours_half = our_cards(OURS_1_DEG), our_cards(OURS_HALF_DEG)
     page = wanted.root / PAGE
-    fill_page(page, "one-degree", "\n".join(beside.markdown(one, ours_one)))
-    fill_page(page, "half-degree", "\n".join(beside.markdown(half, ours_half)))
+    fill_page(page, "one-degree", beside.markdown(one, ours_one))
+    fill_page(page, "half-degree", beside.markdown(half, ours_half))
     beside.draw(wanted.root / PICTURE, {**one, **half}, {**ours_one, **ours_half})
     print(f"wrote {page} and {wanted.root / PICTURE}")
 

@@ -4,6 +4,7 @@
 import math
 from array import array
 from collections.abc import Mapping, Sequence
+from typing import Any
 
 import cv2
 import numpy as np
@@ -38,11 +39,7 @@ class Series:
 
     def add(self, shown: Shown, name: str) -> None:
         """That track's at the next moment."""
-        error = shown.error(name)
-        off = (math.nan, math.nan)
-        if error is not None:
-            off = math.hypot(error[0], error[1]), float(error[2])
-        self._rows.extend((shown.seconds, *off, *shown.claimed(name)))
+        self._rows.extend((shown.seconds, *shown.error(name), *shown.claimed(name)))
 
     def rows(self) -> Float:
         """(n, 5)."""
@@ -96,7 +93,7 @@ class ErrorChart:
         self._paint_curves(picture, rows, 1, reach)
         for event in events:
             if event.kind == KIDNAP:
-                x, top = round(float(self._x(np.array([event.start_s]))[0])), self._boxes[0].y
+                x, top = round(self._x(event.start_s)), self._boxes[0].y
                 cv2.line(picture, (x, top), (x, self._bottom), draw.INK, 1)
                 draw.text(picture, "kidnapped", (x + 3, top), self._px(11), draw.INK, True)
         return picture
@@ -106,20 +103,19 @@ class ErrorChart:
     def _px(self, value: float) -> int:
         return max(1, round(value * self._unit))
 
-    def _x(self, seconds: Float) -> Float:
+    def _x(self, seconds: Any) -> Any:
+        """px from the left, of one moment or of many."""
         (start, end), box = self._span, self._lane_box
-        x: Float = box.x + box.width * (seconds - start) / (end - start)
-        return x
+        return box.x + box.width * (seconds - start) / (end - start)
 
-    def _y(self, plot: int, values: Float, axis: float) -> Float:
+    def _y(self, plot: int, values: Any, axis: float) -> Any:
         """px below the top of the plot of errors, m or rad; ``axis`` as for ``_grid``."""
         if plot == 0:
             level = np.clip(np.log10(np.maximum(values, 10.0**_LOW)), _LOW, axis)
             share = (axis - level) / (axis - _LOW)
         else:  # beyond the axis: along its edge
             share = 0.5 * (1.0 - np.clip(np.degrees(values) / axis, -1.0, 1.0))
-        y: Float = self._boxes[plot].height * share
-        return y
+        return self._boxes[plot].height * share
 
     def _grid(self, high: float, reach: float) -> Picture:
         """Axes, lines and words that stay; up to 10^``high`` m and to ``reach`` degrees."""
@@ -143,7 +139,7 @@ class ErrorChart:
         power = 10.0 ** math.floor(math.log10(span_s))
         step = next(s * power for s in (0.1, 0.2, 0.5, 1.0) if span_s / (s * power) <= 12.5)
         for k in range(math.ceil(start / step - 1e-9), math.floor(end / step + 1e-9) + 1):
-            x, word = round(float(self._x(np.array([k * step]))[0])), f"{k * step:g} s"
+            x, word = round(self._x(k * step)), f"{k * step:g} s"
             cv2.line(picture, (x, self._boxes[0].y), (x, self._bottom), draw.GRID, 1)
             left = min(x - draw.text_width(word, small) // 2, width - draw.text_width(word, small))
             draw.text(picture, word, (left, self._bottom + self._px(4)), small, draw.MUTED)
@@ -173,7 +169,7 @@ class ErrorChart:
 
     def _rule(self, picture: Picture, plot: int, value: float, axis: float, word: str) -> None:
         box = self._boxes[plot]
-        y = box.y + round(float(self._y(plot, np.array([value]), axis)[0]))
+        y = box.y + round(float(self._y(plot, value, axis)))
         cv2.line(picture, (box.x, y), (box.x + box.width, y), draw.GRID, 1)
         self._left_of(picture, y - self._px(7), word)
 
@@ -196,21 +192,21 @@ class ErrorChart:
             at = self._x(thin[:, 0]) - box.x
             outline = np.stack([np.r_[at, at[::-1]], np.r_[upper, lower[::-1]]], axis=1)
             draw.polygon(inside, outline, pale)
-        words = {}
         for name in sorted(rows, key=lambda name: name == self._primary):
             thin = _thinned(rows[name])
             thin = thin[~np.isnan(thin[:, 1 + plot])]
             pixels = [self._x(thin[:, 0]) - box.x, self._y(plot, thin[:, 1 + plot], axis)]
             wide = max(1, self._px(1.6))
             draw.polyline(inside, np.stack(pixels, axis=1), self._colors[name], wide)
-        for name, one in rows.items():
-            if _known(one[-1:, 1 + plot]):
-                last = float(one[-1, 1 + plot])
-                words[name] = _turned(math.degrees(last), axis) if plot else draw.measured(last)
-        last = float(own[-1, 3 + plot]) if len(own) else 0.0
-        claim = f"±2 σ it claims: {math.degrees(last):.2f}°"
-        if plot == 0:
-            claim = f"2 σ it claims: {draw.measured(last) if len(own) else ''}"
+        words = {
+            name: _turned(math.degrees(last), axis) if plot else draw.measured(last)
+            for name, last in ((name, float(one[-1, 1 + plot])) for name, one in rows.items())
+            if not math.isnan(last)
+        }
+        last = float(own[-1, 3 + plot])
+        claim = f"2 σ it claims: {draw.measured(last)}"
+        if plot:
+            claim = f"±2 σ it claims: {math.degrees(last):.2f}°"
         x = box.x + draw.text_width(_TITLES[plot], self._px(13), bold=True) + self._px(14)
         y = box.y - self._px(18)
         for name, word in words.items():
@@ -226,7 +222,7 @@ class ErrorChart:
         for event in sorted(events, key=lambda e: e.seen):  # what was seen lies over what was not
             if event.kind not in self._lanes:
                 continue
-            x0, x1 = self._x(np.array([event.start_s, event.end_s])).round().astype(int).tolist()
+            x0, x1 = (round(self._x(at_s)) for at_s in (event.start_s, event.end_s))
             y = self._lane_box.y + self._lanes.index(event.kind) * self._bar
             full = draw.RED if event.kind == UNSURE else draw.MAGENTA
             low, high = max(x0, self._lane_box.x), max(x1, x0 + self._px(2))

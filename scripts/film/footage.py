@@ -48,7 +48,6 @@ class Footage:
     scans    of a log, how many
     tested   of a log, what says how its scanner is mounted
     empty    of a log, share of its scans with next to no returns
-    no_camera  why there is no 3D view although one was wanted; empty otherwise
     """
 
     stream: Stream
@@ -57,7 +56,6 @@ class Footage:
     duration_s: float
     truth_name: str = "truth"
     slam: str = ""
-    no_camera: str = ""
     scans: int = 0
     empty: float = 0.0
     tested: MountingTest | None = None
@@ -87,6 +85,11 @@ class Footage:
             pace=pace or Pace.within_a_minute(self.duration_s),
             size=size,
         )
+
+    @property
+    def no_camera(self) -> str:
+        """Why there is no 3D view although one was wanted; empty otherwise."""
+        return self.stage.no_camera
 
     def __enter__(self) -> "Footage":
         return self
@@ -127,7 +130,9 @@ def _of_twin(found: Again, view: str | None) -> Footage:
         view=None,  # the room of a twin is another one than its drive's
     )
     if view is not None:
-        footage.no_camera = "this episode is one of three twins, whose rooms only the plan shows"
+        footage.stage.no_camera = (
+            "this episode is one of three twins, whose rooms only the plan shows"
+        )
     return footage
 
 
@@ -163,7 +168,7 @@ def of_simulation(
     made_with = {"odometry": simulation.odometry_preset, **simulation.metadata().extra}
     return Footage(
         stream=stream, stage=stage, title=title, duration_s=float(seconds),
-        no_camera=stage.no_camera, made_with={"simulation": made_with},
+        made_with={"simulation": made_with},
     )  # fmt: skip
 
 
@@ -187,24 +192,22 @@ def of_log(
     if mount is not None or flip:
         by = " and ".join(w for w, on in (("--laser", mount is not None), ("--flip", flip)) if on)
         stream = remounted(stream, mount, flip=flip, by=by)
-    first_ns = last_ns = None
-    labelled, frames, empty, tested = False, 0, 0, MountingTest()
+    labelled, stamps_ns, empty, tested = False, list[int](), 0, MountingTest()
     for frame in stream:
         tested.note(frame)
         empty += frame.scan is not None and float(frame.scan.valid.mean()) < FEW_RETURNS
-        first_ns = frame.stamp_ns if first_ns is None else first_ns
-        last_ns, frames = frame.stamp_ns, frames + 1
+        stamps_ns.append(frame.stamp_ns)
         labelled = labelled or frame.labels is not None
-    if first_ns is None or last_ns is None:
+    if not stamps_ns:
         raise InvalidValueError(f"{path}: holds no frame to film")
     return Footage(
         stream=stream,
         stage=Stage(labelled=labelled),
         title=path.resolve().name,
-        duration_s=(last_ns - first_ns) / NS_PER_S,
+        duration_s=(stamps_ns[-1] - stamps_ns[0]) / NS_PER_S,
         truth_name=stream.metadata.truth or "truth",
-        scans=frames,
-        empty=empty / frames,
+        scans=len(stamps_ns),
+        empty=empty / len(stamps_ns),
         tested=tested,
     )
 

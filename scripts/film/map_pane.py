@@ -24,18 +24,18 @@ MOST_M = 80.0  # of what is shown
 _FRONT_UP = np.array([0.0, 0.0, math.pi / 2.0])
 
 
-def _activity_colors() -> Picture:
-    """256 RGB colours from paper (nothing) over amber (an impression) to ink (certain)."""
-    stops = np.array([0.0, 0.08, 0.35, 0.7, 1.0])
-    colors = np.array(
-        [draw.PAPER, (244, 226, 196), (226, 150, 60), (120, 52, 62), (24, 22, 34)], dtype=float
-    )
-    levels = np.linspace(0.0, 1.0, 256)
-    table = np.stack([np.interp(levels, stops, colors[:, k]) for k in range(3)], axis=1)
-    return table.astype(np.uint8)[:, None]
-
-
-_COLORS = _activity_colors()
+# 256 RGB colours from paper (nothing) over amber (an impression) to ink (certain).
+_STOPS = {
+    0.0: draw.PAPER, 0.08: (244, 226, 196), 0.35: (226, 150, 60), 0.7: (120, 52, 62),
+    1.0: (24, 22, 34),
+}  # fmt: skip
+_COLORS = np.stack(
+    [
+        np.interp(np.linspace(0.0, 1.0, 256), [*_STOPS], one)
+        for one in zip(*_STOPS.values(), strict=True)
+    ],
+    axis=1,
+).astype(np.uint8)[:, None]
 
 
 def raster_picture(raster: Raster, view: View, T_view_map: Float) -> Picture:

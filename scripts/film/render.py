@@ -95,8 +95,6 @@ class Snapshots:
         self, show: Show, seconds: Sequence[float], paint: Callable[[Frame], Picture]
     ) -> None:
         self._show, self._seconds, self._paint = show, tuple(seconds), paint
-        if list(self._seconds) != sorted(self._seconds):
-            raise InvalidValueError(f"moments must be in rising order, got {list(seconds)}")
         self.pictures: list[Picture] = []
 
     def note(self, frame: Frame) -> None:
@@ -121,9 +119,7 @@ def evenly(n: int, start_s: float, end_s: float) -> list[float]:
     """``n`` moments from ``start_s`` to ``end_s``, ends included; one alone is the end."""
     if n < 1:
         raise InvalidValueError(f"a strip needs at least 1 moment, got {n}")
-    if n == 1:
-        return [end_s]
-    return [start_s + (end_s - start_s) * k / (n - 1) for k in range(n)]
+    return [end_s] if n == 1 else np.linspace(start_s, end_s, n).tolist()
 
 
 def strip(
@@ -154,10 +150,9 @@ def strip(
         inner[y + LABEL : y + LABEL + height, x : x + width] = small
     if legend:
         inner = np.vstack([inner, _key(legend, wide)])
-    edges = ((0, MARGIN), (MARGIN, MARGIN))
-    whole: Picture = np.stack(
-        [np.pad(inner[..., k], edges, constant_values=draw.PAPER[k]) for k in range(3)], axis=-1
-    )
+    edges = (0, MARGIN, MARGIN, MARGIN)
+    padded = cv2.copyMakeBorder(inner, *edges, cv2.BORDER_CONSTANT, value=draw.PAPER)
+    whole: Picture = np.asarray(padded, np.uint8)
     with replacing(path) as temporary:
         Image.fromarray(whole).save(temporary, format="PNG", optimize=True)
     return whole

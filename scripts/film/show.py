@@ -7,7 +7,8 @@ for frame in replay.run(stream):
     picture = show.paint(frame)        # whenever one is wanted
 """
 
-from dataclasses import dataclass, field, replace
+from dataclasses import dataclass, field
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -22,7 +23,7 @@ from sim.events import Event
 from sim.view import draw
 from sim.view.draw import Color, Picture
 from sim.view.moment import SIGMAS, Moments, Shown
-from sim.view.scans import LEGEND, beams
+from sim.view.scans import LEGEND
 from slam import se2
 from slam.estimate import Raster
 from slam.frames import Float, Frame, Scan
@@ -31,6 +32,7 @@ from slam.maps import OCCUPIED_THRESHOLD
 from slam.replay import Replay, Track
 from slam.system import MovingMap
 
+SAME_DOUBT_S = 0.5  # doubts so near each other are one
 SEEN_EVERY_S = 0.2  # the areas of neighbouring scans overlap
 MOST_MAPS = 60  # big ones, of a log
 STRAY = 0.002  # share of what stands, on each side, that a poster may leave out
@@ -64,7 +66,11 @@ class Show:
     _seen_s: float = -SEEN_EVERY_S
     _scans: list[tuple[int, Scan]] = field(default_factory=list)  # that were seen, by frame
     _moved: int = 0
-    _panes: "_Panes | None" = None
+
+    @cached_property
+    def panes(self) -> "_Panes":
+        """Its painters, made with the first picture."""
+        return _Panes(self)
 
     @property
     def replay(self) -> Replay:
@@ -80,17 +86,12 @@ class Show:
         """What the filmed system has estimated so far."""
         return self.moments.track
 
-    @property
-    def colors(self) -> dict[str, Color]:
-        """What each track is drawn in, and "truth"."""
-        return draw.colors_of(list(self.replay.tracks))
-
     def named(self) -> list[tuple[str, Color]]:
         """Whose colour is which: the tracks, then the truth where there is one."""
         names = {name: name for name in self.replay.tracks}
         if self.shown is not None and self.shown.truth_map is not None and self.truth_name:
             names["truth"] = self.truth_name
-        return [(_short(word), self.colors[name]) for name, word in names.items()]
+        return [(_short(word), self.moments.colors[name]) for name, word in names.items()]
 
     def legend(self) -> list[tuple[str, Color]]:
         """The same for a strip, with what the colours of the beams say."""
@@ -102,14 +103,12 @@ class Show:
         """(k, 2) m, what the last scan saw where the primary track believes it was."""
         if self.shown is None or self.shown.frame.scan is None:
             return np.zeros((0, 2))
-        T_robot_laser, ends, _ = beams(self.shown.frame)
-        here = self.shown.estimates[self.primary].T_map_robot
-        return se2.transform(se2.compose(here, T_robot_laser), ends)
+        return self.shown.scan_map(self.shown.own.T_map_robot)[0]
 
     def note(self, frame: Frame) -> Shown:
         """Remember this frame's poses and errors; call for every frame, painted or not."""
         self.shown = shown = self.moments.note(frame, self.stage.placed)
-        here = shown.estimates[self.primary]
+        here = shown.own
         if frame.scan is not None and shown.seconds - self._seen_s >= SEEN_EVERY_S - 1e-9:
             self._seen_s = shown.seconds
             self.seen.add(frame.scan, here.T_map_robot)
@@ -118,14 +117,11 @@ class Show:
         for name in self.replay.tracks:
             self.series.setdefault(name, Series()).add(shown, name)
         if not here.converged:
-            before = self.unsure[-1] if self.unsure else None
-            if before is not None and shown.seconds - before.end_s < 0.5:
-                self.unsure[-1] = replace(before, end_s=shown.seconds)
-            else:
-                doubt = Event(
-                    kind=UNSURE, name="", start_s=shown.seconds, end_s=shown.seconds, seen=True
-                )
-                self.unsure.append(doubt)
+            start_s = end_s = shown.seconds
+            if self.unsure and end_s - self.unsure[-1].end_s < SAME_DOUBT_S:
+                start_s = self.unsure.pop().start_s
+            doubt = Event(kind=UNSURE, name="", start_s=start_s, end_s=end_s, seen=True)
+            self.unsure.append(doubt)
         if self._moved != self.moments.moved:  # what was seen lies elsewhere on the map now
             self._moved, self.seen = self.moments.moved, SeenSpace()
             for (_, scan), pose in zip(self._scans, self._poses(), strict=True):
@@ -134,28 +130,24 @@ class Show:
 
     def paint(self, frame: Frame) -> Picture:
         """The film frame at ``frame``: call ``note`` first. Pictures share no memory."""
-        if self._panes is None:
-            self._panes = _Panes(self)
-        return self._panes.paint(frame)
+        return self.panes.paint(frame)
 
     def poster(self, raster: Raster) -> Picture | None:
         """The last frame, its map framed on what stands in ``raster``; None where the whole room
         is in view anyway, or nothing stands."""
         rows, columns = np.nonzero(raster.values > OCCUPIED_THRESHOLD)
-        if self.shown is None or self._panes is None or self.stage.bounds or not len(rows):
+        if self.shown is None or self.stage.bounds or not len(rows):
             return None
         step, origin = raster.resolution_m, raster.T_map_origin
         # without what few beams met through windows
         xmin, xmax = np.quantile(columns, (STRAY, 1.0 - STRAY)) * step + origin[0]
         ymin, ymax = np.quantile(rows, (STRAY, 1.0 - STRAY)) * step + origin[1]
         bounds = float(xmin), float(ymin), float(xmax) + step, float(ymax) + step
-        return self._panes.framed(self.shown.frame, bounds)
+        return self.panes.framed(self.shown.frame, bounds)
 
     def vignette(self, frame: Frame) -> Picture:
         """The scan above the map, without words: what a strip is made of."""
-        whole = self.paint(frame)
-        assert self._panes is not None
-        return self._panes.vignette(whole)
+        return self.panes.vignette(self.paint(frame))
 
     def _poses(self) -> list[Float]:
         """Where the scans that were seen lie in the map by now."""
@@ -175,10 +167,10 @@ class _Panes:
         self._layout, unit = layout, layout.unit
         stage.open(layout)
         self._map = MapPane(*layout.map.size, unit, stage.bounds)
-        self._close = CloseUp(layout.close.size, unit, show.colors[show.primary])
+        self._close = CloseUp(layout.close.size, unit, show.moments.colors[show.primary])
         span = (pace.from_s, max(min(pace.to_s, show.duration_s), pace.from_s + 1.0))
         self._chart = ErrorChart(
-            layout.chart.size, unit, span_s=span, primary=show.primary, colors=show.colors,
+            layout.chart.size, unit, span_s=span, primary=show.primary, colors=show.moments.colors,
             lanes=[*stage.lanes, UNSURE],
         )  # fmt: skip
         self._base = self._still()
@@ -187,25 +179,24 @@ class _Panes:
 
     def paint(self, frame: Frame) -> Picture:
         show, layout, moments = self._show, self._layout, self._show.moments
-        shown, T_view_map = show.shown, self._T_view_map()
+        shown, T_view_map, colors = show.shown, self._T_view_map(), moments.colors
         assert shown is not None
         fresh = (
             show.pace.fps * FRESH_S <= 1.0  # scans come when they come: some early by a part
             or abs(shown.seconds - self._fresh_at) >= FRESH_S * show.pace.speed - 1e-6
         )
-        own, paths = moments.paths[show.primary], moments.paths
         if fresh:
             self._fresh_at = shown.seconds
             raster, landmarks = moments.look(big_rest_s=show.duration_s / MOST_MAPS)
-            self._map.refresh(raster, landmarks, own, T_view_map)
+            self._map.refresh(raster, landmarks, moments.paths[show.primary], T_view_map)
         canvas = self._base.copy()
         self._headline(canvas, shown.seconds)
-        names = [name for name in paths if name != show.primary]
-        if shown.truth_map is None:
-            names.remove("truth")
-        drawn = [(paths[n], show.colors[n], 4 if n == "truth" else 2) for n in names]
-        drawn.append((own, show.colors[show.primary], 2))
-        covariance = shown.estimates[show.primary].covariance
+        drawn = [
+            (path, colors[name], 4 if name == "truth" else 2)
+            for name, path in sorted(moments.paths.items(), key=lambda one: one[0] == show.primary)
+            if name != "truth" or shown.truth_map is not None
+        ]
+        covariance = shown.own.covariance
         picture = self._map.paint(drawn, show.last_points_map, covariance, T_view_map)
         _put(canvas, layout.map, picture)
         _put(canvas, layout.scan, show.stage.scan(frame))
@@ -243,7 +234,7 @@ class _Panes:
     def _close_up(self, canvas: Picture, shown: Shown, covariance: Float) -> None:
         """The last centimetres, and how far off in words."""
         T, box, unit = self._T_view_map(), self._layout.close, self._layout.unit
-        own, turn = shown.estimates[self._show.primary].T_map_robot, se2.rotation(float(T[2]))
+        own, turn = shown.own.T_map_robot, se2.rotation(float(T[2]))
         truth = None if shown.truth_map is None else se2.compose(T, shown.truth_map)
         turned = turn @ covariance[:2, :2] @ turn.T
         _put(canvas, box, self._close.paint(se2.compose(T, own), truth, turned))

@@ -5,8 +5,9 @@ Room and scan lie in the world; map, estimates and paths in the map, which lies 
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from dataclasses import replace
+from functools import partial
 from typing import Any
 
 import numpy as np
@@ -15,7 +16,6 @@ from sim.view import draw
 from sim.view.draw import Color
 from sim.view.moment import Moments, Path, Shown, ellipse
 from sim.view.parts import BOX, Parts, Placed, mesh
-from sim.view.scans import beams
 from sim.world.world import World
 from slam import se2
 from slam.estimate import Landmarks, Raster
@@ -32,6 +32,7 @@ LEVELS = 8  # of a cell of it that are told apart
 STEPS_M, STEPS_TURN = 512.0, 1024.0  # parts of a metre and of a turn that are told apart
 LOG_BOUNDS = (-10.0, -10.0, 10.0, 10.0)  # of what is seen of a log at first, m
 AROUND = 9  # corners of a circle as drawn
+_NO_SHADOW = {"cast_shadow": False, "receive_shadow": False}
 _ARROW = np.array([[0.32, 0.0, 0.0], [-0.22, 0.2, 0.0], [-0.1, 0.0, 0.0], [-0.22, -0.2, 0.0]])
 
 
@@ -49,7 +50,6 @@ class Drawn:
         self.parts = None if world is None else Parts(world.scene, world.model)
         self._height_m = 0.0 if world is None else world.scene.scan_height_m
         self.bounds = LOG_BOUNDS if world is None else world.scene.bounds
-        self._colors = draw.colors_of(list(moments.replay.tracks))
         self._nodes: dict[str, Any] = {}
         self._values: dict[str, Any] = {}
         self._placed: Placed | None = None
@@ -78,10 +78,8 @@ class Drawn:
             self._landmarks(shown.landmarks)
         renew = abs(shown.seconds - self._path_s) >= PATH_S
         self._path_s = shown.seconds if renew else self._path_s
-        for name, estimate in shown.estimates.items():
-            self._track(name, estimate.T_map_robot, estimate.covariance)
-        if shown.truth_map is not None:
-            self._track("truth", shown.truth_map, None)
+        for name, (pose, covariance) in shown.robots().items():
+            self._track(name, pose, covariance)
         if renew:
             for name, path in self.moments.paths.items():
                 self._path(name, path, shown.number)
@@ -98,40 +96,30 @@ class Drawn:
                 continue
             centres, quats = parts.poses(batch)
             centres, quats = np.rint(centres * STEPS_M) / STEPS_M, np.rint(quats * STEPS_TURN)
-            quats /= STEPS_TURN
-            name = f"room/{k}_{batch.shape}"
-            if not first:
-                self._set(name, batched_positions=centres, batched_wxyzs=quats)
-                continue
-            vertices, faces = mesh(batch.shape, AROUND)
-            self._nodes[name] = self._scene.add_batched_meshes_simple(
-                f"/{name}", vertices, faces, quats, centres,
+            name, (vertices, faces) = f"room/{k}_{batch.shape}", mesh(batch.shape, AROUND)
+            add = partial(
+                self._scene.add_batched_meshes_simple, f"/{name}", vertices, faces,
                 batched_scales=batch.sizes.astype(np.float32), batched_colors=batch.colors,
                 batched_opacities=batch.opacity if batch.glass else None,
-                flat_shading=batch.shape == BOX, lod="off", cast_shadow=False,
-                receive_shadow=False,
+                flat_shading=batch.shape == BOX, lod="off", **_NO_SHADOW,
             )  # fmt: skip
+            self._put(name, add, batched_positions=centres, batched_wxyzs=quats / STEPS_TURN)
 
     # -- what is measured and estimated ---------------------------------------------------------
 
     def _scan(self, shown: Shown) -> None:
         """Where beams ended: where the robot truly is, in a log where it is believed to be."""
-        here = shown.truth_map
-        if here is None:
-            here = shown.estimates[self.moments.primary].T_map_robot
-        mounted, xy, rgb = beams(shown.frame)
+        here = shown.own.T_map_robot if shown.truth_map is None else shown.truth_map
+        xy, rgb = shown.scan_map(here)
         # a slow page moves nodes at once and points later: where they lie, points say, and of few m
         near = np.round(np.r_[here[:2], 0.0] / NEAR_M) * NEAR_M
         wxyz, position = _pose(near, self._height_m + LIFT_M)
-        xy = se2.transform(se2.compose(here, mounted), xy) - near[:2]
-        points = np.column_stack([xy, np.zeros(len(xy))]).astype(np.float16)
-        if "scan" in self._nodes:
-            self._set("scan", points=points, colors=rgb, position=position)
-            return
-        self._nodes["scan"] = self._scene.add_point_cloud(
-            "/map/scan", points, rgb, point_size=POINT_M, point_shape="circle",
-            point_shading="flat", wxyz=wxyz, position=position,
+        points = np.column_stack([xy - near[:2], np.zeros(len(xy))]).astype(np.float16)
+        add = partial(
+            self._scene.add_point_cloud, "/map/scan", point_size=POINT_M, point_shape="circle",
+            point_shading="flat", wxyz=wxyz,
         )  # fmt: skip
+        self._put("scan", add, points=points, colors=rgb, position=position)
 
     def _cells(self, raster: Raster | None) -> None:
         """The map in the colours of the pictures; unknown cells are transparent."""
@@ -149,7 +137,7 @@ class Drawn:
         # a picture's second axis goes down: turned half round its first, it lies on its back
         self._nodes["cells"] = self._scene.add_image(
             "/map/cells", cells, wide, high, wxyz=(0.0, w, z, 0.0), position=position,
-            cast_shadow=False, receive_shadow=False,
+            **_NO_SHADOW,
         )  # fmt: skip
 
     def _landmarks(self, landmarks: Landmarks | None) -> None:
@@ -164,7 +152,7 @@ class Drawn:
 
     def _track(self, name: str, pose: Float, covariance: Float | None) -> None:
         """A robot as an arrow, with its ellipse."""
-        (wxyz, position), color = _pose(pose), self._colors[name]
+        (wxyz, position), color = _pose(pose), self.moments.colors[name]
         if name not in self._nodes:
             node = f"/map/{_node(name)}"
             self._nodes[name] = self._scene.add_frame(
@@ -172,8 +160,7 @@ class Drawn:
             )
             self._scene.add_mesh_simple(
                 f"{node}/arrow", _ARROW + np.array([0.0, 0.0, self._height_m + ROBOT_M]),
-                np.array([[0, 1, 2], [0, 2, 3]]), color=color, side="double", cast_shadow=False,
-                receive_shadow=False,
+                np.array([[0, 1, 2], [0, 2, 3]]), color=color, side="double", **_NO_SHADOW,
             )  # fmt: skip
         self._set(name, wxyz=wxyz, position=position)
         if covariance is not None:
@@ -184,17 +171,22 @@ class Drawn:
     def _path(self, name: str, path: Path, number: int) -> None:
         way = _segments(path.points(PATH_POINTS, number))
         if len(way):
-            self._lines(f"path/{name}", way, self._colors[name], 0.03)
+            self._lines(f"path/{name}", way, self.moments.colors[name], 0.03)
 
     def _lines(self, name: str, segments: Float, color: Color, wide_m: float) -> None:
         segments = np.round(segments, 3).astype(np.float32)
         colors = np.broadcast_to(np.array(color, np.uint8), segments.shape)
+        if len(segments) or name in self._nodes:
+            node = f"/map/{'/'.join(map(_node, name.split('/')))}"
+            add = partial(self._scene.add_line_segments, node, thickness=wide_m)
+            self._put(name, add, points=segments, colors=colors)
+
+    def _put(self, name: str, add: Callable[..., Any], **values: Any) -> None:
+        """Make the node, or tell it what has changed."""
         if name in self._nodes:
-            self._set(name, points=segments, colors=colors)
-        elif len(segments):
-            self._nodes[name] = self._scene.add_line_segments(
-                f"/map/{'/'.join(map(_node, name.split('/')))}", segments, colors, thickness=wide_m
-            )
+            self._set(name, **values)
+        else:
+            self._nodes[name] = add(**values)
 
     def _set(self, name: str, **values: Any) -> None:
         """Tell the node what has changed."""

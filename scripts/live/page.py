@@ -81,9 +81,8 @@ class Page:
 
     def show(self, shown: Shown, playback: Playback, session: Session) -> None:
         """What the words and the plot say of a moment."""
-        now, name = self._wall(), session.moments.primary
-        error, claimed = shown.error(name), shown.claimed(name)[0]
-        off = math.nan if error is None else math.hypot(error[0], error[1])
+        now, name = self._wall(), shown.primary
+        (off, _), (claimed, _) = shown.error(name), shown.claimed(name)
         self._back_s = playback.present.seconds - shown.seconds if playback.present else 0.0
         if not playback.looks_back:
             self._series.append((shown.seconds, off, claimed))
@@ -94,7 +93,7 @@ class Page:
             self._shown_s = now
             self._status.content = self._words(shown, playback, session, off, claimed)
             self._play.label = "Pause" if playback.playing else "Play"
-            verdict = f"{shown.seconds:.0f} s · {name}: {shown.verdict(name)}"
+            verdict = f"{shown.seconds:.0f} s · {name}: {shown.verdict}"
             self._label(self._answer if now < self._answer_until else verdict)
         if now - self._plot_s >= PLOT_S and len(self._series) > 1:
             self._plot_s = now
@@ -122,8 +121,7 @@ class Page:
     def _words(
         self, shown: Shown, playback: Playback, session: Session, off: float, claimed: float
     ) -> str:
-        hands, name = session.hands, session.moments.primary
-        verdict = shown.verdict(name)
+        hands, name, verdict = session.hands, shown.primary, shown.verdict
         driver = "log" if hands is None else "you drive" if hands.client_drives else "on tour"
         state = "playing" if playback.playing else "paused"
         if playback.looks_back:

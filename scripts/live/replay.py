@@ -97,10 +97,9 @@ class Recorder:
         return page.replace("<title>Viser</title>", f"<title>{html.escape(self._title)}</title>", 1)
 
     def _said(self, shown: Shown) -> str:
-        name = self.moments.primary
-        error = shown.error(name)
-        off = "" if error is None else f", {100.0 * math.hypot(error[0], error[1]):.1f} cm off"
-        return f"{self._title} · {shown.seconds:.1f} s · {name}: {shown.verdict(name)}{off}"
+        off_m, _ = shown.error(shown.primary)
+        off = "" if math.isnan(off_m) else f", {100.0 * off_m:.1f} cm off"
+        return f"{self._title} · {shown.seconds:.1f} s · {shown.primary}: {shown.verdict}{off}"
 
 
 def _taped() -> tuple[Any, Any, Any]:

@@ -235,24 +235,13 @@ def require() -> Any:
 PANEL = 0.3  # of a room's width: so much more is left for the panel at its right
 # viser's panel covers most of a phone: there it begins as a strip, whose handle opens half of it.
 # A browser captures a finger for what it touches, which viser takes for a drag: no tap would click.
-_PHONE = b"""<style>@media (max-width: 600px) {
-[style*="max-height: 60%"] { width: 100% !important; max-height: 50% !important }
-[style*="max-height: 60%"] * { max-width: 100vw }
-}</style><script>
-if (innerWidth <= 600) new MutationObserver((_, seen) => {
-  const handle = document.querySelector('[style*="max-height: 60%"] [style*="cursor: pointer"]');
-  if (handle) { seen.disconnect(); setTimeout(() => handle.click(), 500) }
-}).observe(document, {childList: true, subtree: true})
-addEventListener('pointerdown', event => {
-  if (event.pointerType === 'touch') event.target.releasePointerCapture(event.pointerId)
-}, true)
-</script></head>"""
+PHONE = Path(__file__).with_name("phone.html")
 
 
 def page_of(viser: Any) -> bytes:
     """The page that viser's wheel brings: one file, whole without a net."""
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
-    return page.replace(b"</head>", _PHONE, 1)
+    return page.replace(b"</head>", PHONE.read_bytes() + b"</head>", 1)
 
 
 class Served:

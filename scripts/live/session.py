@@ -79,13 +79,10 @@ class Session:
 
     def _begun(self) -> list[str]:
         """Events that have begun since it was last asked."""
-        found = []
-        for event in self.footage.stage.events():
-            key = (event.kind, event.name, event.start_s)
-            if key not in self._known:
-                self._known.add(key)
-                found.append(_told(event))
-        return found
+        events = {(e.kind, e.name, e.start_s): e for e in self.footage.stage.events()}
+        fresh = [event for key, event in events.items() if key not in self._known]
+        self._known.update(events)
+        return [_told(event) for event in fresh]
 
 
 def _told(event: Event) -> str:

@@ -69,7 +69,7 @@ class Network:
     def __init__(self, link: Link) -> None:
         self._link, self._robot = link, Robot(link)
         self._sent = -1
-        self._refused: MobiliaError | None = None
+        self._refused: str | None = None
         self._told_s = -SILENCE_S
         for topic, _ in TAKES:
             link.subscribe(topic)
@@ -96,14 +96,14 @@ class Network:
 
     def refuse(self, why: str) -> None:
         """Keep this to be told."""
-        self._refused = InvalidValueError(f"ROS 2: {why}")
+        self._refused = f"ROS 2: {why}"
 
     def refused(self) -> str | None:
         """What is to be told, once a ``SILENCE_S`` at most."""
         now_s = time.monotonic()
         if self._refused is None or now_s - self._told_s < SILENCE_S:
             return None
-        said, self._refused, self._told_s = str(self._refused), None, now_s
+        said, self._refused, self._told_s = self._refused, None, now_s
         return said
 
     def close(self) -> None:

@@ -8,6 +8,7 @@ and macros; the report of a comparison is another page of it.
 import base64
 import re
 import shlex
+import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
 from fnmatch import fnmatch
@@ -21,58 +22,16 @@ import numpy as np
 from numpy.typing import NDArray
 from rich.markup import escape
 from rich.table import Table as Printed
-from rich.text import Text
 
 from scripts.console import fact, say
+from scripts.pages.table import of_printed
 from sim.recording.sums import SUMS, add_to_sums
 from slam.files import write_text
 
 INDEX, INLINE = "index.html", "data:image/png;base64,"
 HERE = Path(__file__).parent
-ABOUT: dict[str, str] = {  # what each file is, in the order in which they are listed
-    "replay.html": "the run in 3-D, to turn and to scrub",
-    "replays/*.html": "a run in 3-D, to turn and to scrub",
-    "film.mp4": "the run as a film", "poster.png": "a moment of the film",
-    "report.html": "the report of this comparison",
-    "map.png": "the map", "changes.png": "what changed in the map",
-    "map.yaml": "the map for nav2_map_server, with map.pgm", "map.pgm": "the map's cells",
-    "map*.npz": "the SLAM's own map, for --map-in and load()",
-    "trajectories.png": "the paths over the map", "errors.png": "the error over time",
-    "trajectory_*.tum": "poses for evo: time x y z qx qy qz qw",
-    "mobility.png": "how often each place changes",
-    "closed_loop.png": "goals reached at each level", "paths.png": "the paths driven",
-    "blame.png": "the run, the culprit and the re-runs", "blame.json": "every re-run in numbers",
-    "results.json": "every number", "lifelong.csv": "a row for each session and SLAM",
-    "lifelong.json": "the same with its settings", "changes.csv": "what changed each time",
-    "ages.csv": "the last session in older maps", "goals.csv": "a row for each goal",
-    "leaderboard.csv": "a row for each track and SLAM", "leaderboard.json": "the same for programs",
-    "leaderboard.md": "the leaderboard as a page of documentation", "days.csv": "scores over days",
-    "submission_*.json": "a submission to the leaderboard",
-    "runs.csv": "a row for each run", "levels.csv": "a row for each level", "runs.json": "all runs",
-    "dataset.json": "the plan of the dataset", "relations.txt": "which episodes are of one place",
-    "*.txt": "a list of episodes", "recipe.json": "what makes this folder again",
-    "SHA256SUMS": "hashes of all files, for mobilia verify",
-}  # fmt: skip
+ABOUT: dict[str, str] = tomllib.loads((HERE / "files.toml").read_text(encoding="utf-8"))
 LISTED = 24  # files of a kind beyond these are counted
-
-
-@dataclass(frozen=True, kw_only=True)
-class Cell:
-    """``text`` with ``small`` print after it; ``mark`` is "better", "worse", "best" or ""."""
-
-    text: str
-    small: str = ""
-    mark: str = ""
-
-
-@dataclass(frozen=True, kw_only=True)
-class Table:
-    """``slams`` are the heads that name one, for its colour; the first column names the row."""
-
-    caption: str
-    head: Sequence[str]
-    rows: Sequence[Sequence[Cell]]
-    slams: Sequence[str] = field(default_factory=tuple)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -135,20 +94,11 @@ def command(*words: object) -> str:
     return shlex.join(["mobilia", *map(str, words)])
 
 
-def of_printed(table: Printed) -> Table:
-    """A table of the console for a page."""
-    columns = [[Text.from_markup(str(c)).plain for c in one.cells] for one in table.columns]
-    rows = [[Cell(text=text) for text in row] for row in zip(*columns, strict=True)]
-    head = [Text.from_markup(str(one.header)).plain for one in table.columns]
-    caption = Text.from_markup(str(table.title or "")).plain
-    return Table(caption=caption, head=head, rows=rows)
-
-
 @cache
 def template(name: str, folder: Path = HERE) -> jinja2.Template:
     """A template of ``folder``, which may extend or import those here."""
     environment = jinja2.Environment(
-        loader=jinja2.FileSystemLoader([folder, HERE]), autoescape=True,
+        loader=jinja2.FileSystemLoader([folder, HERE]), autoescape=jinja2.select_autoescape(),
         undefined=jinja2.StrictUndefined, trim_blocks=True, lstrip_blocks=True,
     )  # fmt: skip
     environment.filters["parts"] = lambda name: re.findall(r"[^:/_.]*[:/_.]?", name)[:-1]

@@ -7,12 +7,12 @@ the room can be trusted, ``failed`` who raised, hung or gave no answer. All of t
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 from typing import Any
 
 from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import FAILED
-from scripts.comparison.tables import by_seed, number
+from scripts.comparison.tables import by_seed, grouped, number
 from scripts.options import PEOPLE
 from scripts.report.study import LEAST_RUNS, verdict
 from slam.evaluation.statistics import paired, share_interval
@@ -92,6 +92,17 @@ class Standing:
     own_oracle: bool = False
     runs_a_seed: int = 1
 
+    @property
+    def bracket(self) -> tuple[Level | None, Level | None]:
+        """The last level that holds before the first that is lost, and that one."""
+        first = next((level for level in self.levels if level.subject.half), None)
+        before = [level for level in self.levels if first is None or level.at < first.at]
+        return (before[-1] if before else None), first
+
+    def at(self, *levels: float) -> str:
+        """Such as " at 0.5 and 1"; "" where there is one level alone."""
+        return "" if len(self.levels) == 1 else " at " + listed([f"{at:g}" for at in levels])
+
     def place(self, levels: Sequence[float]) -> str:
         """Such as "dynamism 0.5 and 1", or "8 and 12 people"."""
         each = listed([f"{level:g}" for level in levels])
@@ -113,28 +124,30 @@ def standing(
     """Of the rows of ``runs.csv``. The oracle is the one that is lost least."""
     rows = [row for row in rows if row["scene"] == scene]
     slams = list(dict.fromkeys(str(row["slam"]) for row in rows))
-    is_control = subject == ODOMETRY or subject.startswith(ORACLE)
-    oracles = [] if is_control else [slam for slam in slams if slam.startswith(ORACLE)]
+    rivals = [] if is_control(subject) else slams
+    oracles = [slam for slam in rivals if slam.startswith(ORACLE)]
     oracle = min(oracles, key=lambda slam: _lost(rows, slam).lost, default=None)
-    odometry = ODOMETRY if ODOMETRY in slams and not is_control else None
+    odometry = ODOMETRY if ODOMETRY in rivals else None
     levels = []
-    for at in sorted({float(row["dynamism"]) for row in rows}):
-        here = [row for row in rows if row["dynamism"] == at]
-        levels.append(
-            Level(
-                at=at,
-                subject=_lost(here, subject),
-                odometry=_lost(here, odometry) if odometry else None,
-                against=against(here, subject, odometry) if odometry else 0,
-                farther=sum(a > b for a, b in _errors(here, subject, odometry)) if odometry else 0,
-                oracle=_lost(here, oracle) if oracle else None,
-            )
-        )
+    for (at,), here in sorted(grouped(rows, ("dynamism",)).items()):
+        level = Level(at=float(at), subject=_lost(here, subject))
+        if odometry:
+            farther = sum(a > b for a, b in _errors(here, subject, odometry))
+            level = replace(
+                level, odometry=_lost(here, odometry), against=against(here, subject, odometry),
+                farther=farther,
+            )  # fmt: skip
+        levels.append(replace(level, oracle=_lost(here, oracle)) if oracle else level)
     own = oracle is not None and (oracle_of(oracle) or ("",))[0] == subject
     return Standing(
         subject=subject, scene=scene, axis=axis, levels=tuple(levels), own_oracle=own,
         runs_a_seed=runs_a_seed,
     )  # fmt: skip
+
+
+def is_control(slam: str) -> bool:
+    """Whether others are held against it: odometry and oracles."""
+    return slam == ODOMETRY or slam.startswith(ORACLE)
 
 
 def _lost(rows: Sequence[Row], slam: str) -> Lost:
@@ -193,36 +206,28 @@ def _seen(of: Standing) -> str:
 
 def _concluded(of: Standing) -> str:
     """The bracket of levels, and what share of such runs at its ends is lost, 95 %."""
-    holds = [level for level in of.levels if not level.subject.half]
-    lost = [level for level in of.levels if level.subject.half]
-    first = lost[0] if lost else of.levels[-1]
-    low, high = share_interval(first.subject.lost, first.subject.runs)
-    where = "" if len(of.levels) == 1 else f" at {first.at:g}"
-    if not lost:
-        worst = max(reversed(of.levels), key=lambda level: level.subject.lost)
-        low, high = share_interval(worst.subject.lost, worst.subject.runs)
-        where = "" if len(of.levels) == 1 else f" at {worst.at:g}"
-        return f"so at most {100.0 * high:.0f} % of such runs are lost{where} (95 %)"
-    sure = f"so at least {100.0 * low:.0f} % of such runs are lost{where} (95 %)"
-    before = [level for level in holds if level.at < first.at]
+    before, first = of.bracket
+    end = first or max(reversed(of.levels), key=lambda level: level.subject.lost)
+    low, high = share_interval(end.subject.lost, end.subject.runs)
+    if first is None:
+        return f"so at most {100.0 * high:.0f} % of such runs are lost{of.at(end.at)} (95 %)"
+    sure = f"so at least {100.0 * low:.0f} % of such runs are lost{of.at(end.at)} (95 %)"
     if before and all(level.subject.half for level in of.levels if level.at >= first.at):
         begins = f"at {first.at:g}"
         if of.axis == PEOPLE:
             begins = f"from {of.place([first.at])} on in {of.scene}"
-        return f"it holds at {before[-1].at:g} and is lost {begins}, {sure}"
+        return f"it holds at {before.at:g} and is lost {begins}, {sure}"
     return sure
 
 
 def _to_decide(of: Standing) -> str:
     """How many seeds would tell on which side of one half it is, at the ends of the bracket."""
-    lost = [level for level in of.levels if level.subject.half]
-    before = [level for level in of.levels if not lost or level.at < lost[0].at]
-    open_ = [level for level in (*before[-1:], *lost[:1]) if _is_open(level.subject)]
+    open_ = [level for level in of.bracket if level is not None and _is_open(level.subject)]
     if not open_:
         return ""
     most = TRACK_SEEDS if of.axis == LEVEL else MOST_SEEDS
     wanted = [_runs_to_tell(level.subject, most * of.runs_a_seed) for level in open_]
-    at = "" if len(of.levels) == 1 else " at " + listed([f"{level.at:g}" for level in open_])
+    at = of.at(*(level.at for level in open_))
     if not all(wanted):
         return f"that is too near to one half{at} for {most} seeds to tell"
     seeds = math.ceil(max(wanted) / of.runs_a_seed)
@@ -286,36 +291,27 @@ def _unfair(of: Standing) -> str:
 
 def controls(of: Standing) -> list[str]:
     """What odometry and the oracle did on the same runs, or how to ask them."""
-    if of.subject == ODOMETRY or of.subject.startswith(ORACLE):
+    if is_control(of.subject):
         return []
     top = of.levels[-1]
     best = [level.oracle for level in of.levels if level.oracle is not None]
-    said = []
+    alone = "Odometry, the control that looks at nothing, did not run: `--slam … odometry`."
     if top.odometry:
-        said.append(f"Odometry alone is lost in {top.odometry}, at {of.place([top.at])}.")
-    else:
-        said.append(
-            "Odometry, the control that looks at nothing, did not run: `--slam … odometry`."
-        )
-    if not best:
-        said.append("No oracle ran: `--oracle shunting` tells whether the room is fair.")
-    elif not any(one.lost for one in best):
-        said.append(f"The oracle is never lost ({_each(best)}), so the room is fair.")
-    else:
-        said.append(
-            f"The oracle is lost in up to {max(best, key=lambda one: one.lost / max(one.runs, 1))}."
-        )
-    return said
+        alone = f"Odometry alone is lost in {top.odometry}, at {of.place([top.at])}."
+    fair = "No oracle ran: `--oracle shunting` tells whether the room is fair."
+    if any(one.lost for one in best):
+        most = max(best, key=lambda one: one.lost / max(one.runs, 1))
+        fair = f"The oracle is lost in up to {most}."
+    elif best:
+        fair = f"The oracle is never lost ({_each(best)}), so the room is fair."
+    return [alone, fair]
 
 
 def failed(rows: Sequence[Row], axis: str = "dynamism") -> list[str]:
     """A line for each SLAM that failed and way of failing: how often, where first, what it said."""
-    found: dict[tuple[str, str], list[Row]] = {}
-    for row in rows:
-        if row["outcome"] in FAILED:
-            found.setdefault((str(row["slam"]), str(row["outcome"])), []).append(row)
     said = []
-    for (slam, outcome), own in found.items():
+    bad = [row for row in rows if row["outcome"] in FAILED]
+    for (slam, outcome), own in grouped(bad, ("slam", "outcome")).items():
         runs = sum(row["slam"] == slam for row in rows)
         first = own[0]
         where = f"{first['scene']} at {axis} {first['dynamism']:g}, seed {first['seed']:g}"

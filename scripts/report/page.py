@@ -3,15 +3,17 @@
 
 import math
 import shlex
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from scripts.closed_loop.tables import Driven
 from scripts.comparison.plan import Run
 from scripts.comparison.schema import LATER, settings
-from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, of_section
-from scripts.pages.page import Cell, Table, template
+from scripts.figures import color_of, glyph
+from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, Section, of_section
+from scripts.pages.page import template
+from scripts.pages.table import Table
 from scripts.report import answer, curves, pictures, score_tables, tables
 from scripts.report.study import LEAST_RUNS, Study
 from sim.recording.sums import add_to_sums
@@ -33,30 +35,36 @@ def render(study: Study, drives: Sequence[Driven] = ()) -> str:
     """The page as text: everything is in it, it asks for nothing."""
     slams = list(dict.fromkeys([*study.slams, *(s for drive in drives for s in drive.slams)]))
     scenes = [_scene(study, scene) for scene in study.scenes]  # first: these read the runs
+    many = len(study.levels) > 1  # of one there is no curve and no growth
+    pairs = study.measures(PAIRED)
     return template("page.html", Path(__file__).parent).render(
         study=study,
-        marks={slam: (curves.glyph(slam, slams), curves.color(slam, slams)) for slam in slams},
+        marks={slam: (glyph(slam, slams), color_of(slam, slams)) for slam in slams},
         drives=[(drive, curves.of_drive(drive, slams), tables.of_drive(drive)) for drive in drives],
         settings=study.compared.settings,
         answers=answers(study),
         controls=_controls(study),
         failures=answer.failed(study.compared.runs, study.axis),
-        growth=[]
-        if len(study.levels) == 1
-        else [(scene, tables.growth(study, scene)) for scene in study.scenes],
+        growth=[(scene, tables.growth(study, scene)) for scene in study.scenes if many],
         least=LEAST_RUNS,
-        curves=_curves(study),
-        differences=_differences(study),
+        curves=[
+            (scene, [(m.name, curves.curve(study, scene, m)) for m in study.measures(CURVES)])
+            for scene in study.scenes if many
+        ],
+        differences=[(scene, tables.of_pairs(study, scene, pairs)) for scene in study.scenes],
         outcomes=tables.of_outcomes(study),
-        honesty=_levels(study, of_section("honesty")),
-        costs=tables.costs(study, of_section("costs")),
-        maps=_levels(study, of_section("maps")),
-        days=_days(study),
+        honesty=_levels(study, "honesty"),
+        costs=tables.costs(study, study.measures(of_section("costs"))),
+        maps=_levels(study, "maps"),
+        days=[
+            (score_tables.where(group), score_tables.sentences(own), score_tables.table(own))
+            for group, own in score_tables.groups(study.compared.ages).items()
+        ],
         scenes=scenes,
-        numbers=_levels(study, of_section("errors")),
-        measures=[metric for metric in EXPLAINED if study.has(metric.key)],
+        numbers=_levels(study, "errors"),
+        measures=study.measures(metric.key for metric in EXPLAINED),
         recipe=_recipe(study),
-    )
+    )  # fmt: skip
 
 
 def answers(study: Study) -> list[str]:
@@ -87,52 +95,11 @@ def blame_command(study: Study, row: dict[str, Any], folder: str = "FOLDER") -> 
     return shlex.join(["mobilia", "blame", path, "--slam", str(row["slam"])])
 
 
-def _there(study: Study, keys: Iterable[str]) -> list[str]:
-    return [key for key in keys if study.has(key)]
-
-
-def _curves(study: Study) -> list[tuple[str, list[tuple[str, str]]]]:
-    """For each scene (name of the metric, SVG); none of a single level, which is no curve."""
-    if len(study.levels) == 1:
-        return []
-    return [
-        (
-            scene,
-            [(METRICS[key].name, curves.curve(study, scene, key)) for key in _there(study, CURVES)],
-        )
-        for scene in study.scenes
-    ]
-
-
-def _differences(study: Study) -> list[tuple[str, list[Table]]]:
-    """For each scene the tables of the subject against everybody."""
-    found = [METRICS[key] for key in _there(study, PAIRED)]
-    return [(scene, tables.of_pairs(study, scene, found)) for scene in study.scenes]
-
-
-def _levels(study: Study, keys: Iterable[str]) -> list[tuple[str, list[Table]]]:
+def _levels(study: Study, section: Section) -> list[tuple[str, list[Table]]]:
     """For each scene the tables of those measures that are there."""
-    found = [METRICS[key] for key in keys]
+    found = [METRICS[key] for key in of_section(section)]
     groups = [(scene, tables.of_levels(study, scene, found)) for scene in study.scenes]
     return [(scene, made) for scene, made in groups if made]
-
-
-def _days(study: Study) -> list[tuple[str, list[str], Table]]:
-    """Of the buildings of each scene and level: where, a sentence a SLAM, and the table."""
-    return [
-        (score_tables.where(group), score_tables.sentences(own), _scores(own))
-        for group, own in score_tables.groups(study.compared.ages).items()
-    ]
-
-
-def _scores(rows: Sequence[Mapping[str, Any]]) -> Table:
-    names = score_tables.slams_of(rows)
-    lines = [
-        [Cell(text=heading), *(Cell(text=text, small=small) for text, small in cells)]
-        for heading, cells in score_tables.table(rows)
-    ]
-    caption = score_tables.size(rows)
-    return Table(caption=caption, head=["score", *names], rows=lines, slams=names)
 
 
 def _scene(study: Study, scene: str) -> dict[str, Any]:
@@ -157,12 +124,12 @@ def _scene(study: Study, scene: str) -> dict[str, Any]:
 
 def _worst_in_words(row: dict[str, Any], axis: str) -> str:
     ate = METRICS["ate_unaligned_m"]
-    words_ = f"{axis} {row['dynamism']:g}, seed {row['seed']:g}: {row['outcome']}"
-    if row["ate_unaligned_m"] is not None and math.isfinite(row["ate_unaligned_m"]):
-        words_ += f", position error {ate.show(row['ate_unaligned_m'])} cm"
+    words = f"{axis} {row['dynamism']:g}, seed {row['seed']:g}: {row['outcome']}"
+    if row[ate.key] is not None and math.isfinite(row[ate.key]):
+        words += f", position error {ate.show(row[ate.key])} cm"
     if row["lost_at_s"] is not None:
-        words_ += f", lost at {row['lost_at_s']:.1f} s"
-    return words_ + "."
+        words += f", lost at {row['lost_at_s']:.1f} s"
+    return words + "."
 
 
 def blame_worst(study: Study) -> list[str]:
@@ -193,19 +160,19 @@ def _recipe(study: Study) -> dict[str, Any]:
 
 def _command(told: dict[str, Any]) -> str:
     """The command line that asks for this comparison."""
-    seeds = told["seeds"]
-    words_ = ["mobilia", "compare"]
-    for option, values in (("--slam", told["slams"]), ("--scene", told["scenes"])):
-        words_ += [option, *map(str, values)]
-    axis = told.get("axis", "dynamism")
-    words_ += [f"--{axis}", *(f"{level:g}" for level in told["levels"])]
-    for name in ("motion", "change", "crowd"):
-        if told.get(name) is not None:
-            words_ += [f"--{name}", str(told[name])]
-    if told.get("sessions") is not None:
-        words_ += ["--sessions", str(told["sessions"])]
-    words_ += ["--seeds", str(len(seeds)), "--first-seed", str(seeds[0])]
-    words_ += ["--seconds", f"{told['seconds']:g}", "--every", str(told["every"])]
-    words_ += ["--scanner", told["scanner"], "--scan-limit", f"{told['scan_limit_s']:g}"]
-    words_ += ["--out", "FOLDER"]
-    return shlex.join(words_)
+    seeds, knobs = told["seeds"], ("motion", "change", "crowd", "sessions")
+    given = {
+        "slam": told["slams"],
+        "scene": told["scenes"],
+        told.get("axis", "dynamism"): [f"{level:g}" for level in told["levels"]],
+        **{name: [told[name]] for name in knobs if told.get(name) is not None},
+        "seeds": [len(seeds)],
+        "first-seed": seeds[:1],
+        "seconds": [f"{told['seconds']:g}"],
+        "every": [told["every"]],
+        "scanner": [told["scanner"]],
+        "scan-limit": [f"{told['scan_limit_s']:g}"],
+        "out": ["FOLDER"],
+    }
+    options = (word for name, values in given.items() for word in (f"--{name}", *map(str, values)))
+    return shlex.join(["mobilia", "compare", *options])

@@ -14,10 +14,10 @@ from matplotlib.patheffects import withStroke
 from matplotlib.transforms import Affine2D
 
 from scenes.kinds import is_door
+from scripts import figures
 from scripts.comparison.run_file import RunFile
-from scripts.figures import error_series, log_axis
+from scripts.figures import COLORS, SVG, color_of, styled, svg
 from scripts.metrics.judged import in_first_frame
-from scripts.report import curves
 from slam import se2
 from slam.evaluation.lost import LOST_M
 from slam.frames import Float
@@ -26,7 +26,7 @@ from slam.trajectory import Trajectory
 
 MOMENTS = 8
 AROUND_M = 3.0  # of the paths, in the strip
-MOVING, RESTING, SCAN = "#e0902c", "#c3c7ce", "#1f61be"
+MOVING, RESTING, SCAN, TRUTH = "#e0902c", "#c3c7ce", "#1f61be", COLORS["truth"]
 _PANEL = 2.9  # inches
 _INK = np.array([22.0, 33.0, 58.0]) / 255.0
 _COLORS = ListedColormap(
@@ -34,27 +34,27 @@ _COLORS = ListedColormap(
 ).with_extremes(bad="#e6e8eb")
 
 
+@styled(SVG)
 def map_panels(run: RunFile, slams: Sequence[str]) -> list[tuple[str, str]]:
     """(title, SVG): the room as it was at the end, then the last map of each SLAM that has one."""
     figure, ax = _panel(run)
-    with curves.styled():
-        _image(ax, run.static_map)
-        _movers(ax, run, len(run.truth) - 1)
-        ax.plot(run.truth[:, 0], run.truth[:, 1], color=curves.TRUTH, lw=1.1)
-    panels = [("truth", curves.svg(figure, "the room at the end of the run, from above"))]
+    _image(ax, run.static_map)
+    _movers(ax, run, len(run.truth) - 1)
+    ax.plot(run.truth[:, 0], run.truth[:, 1], color=TRUTH, lw=1.1)
+    panels = [("truth", svg(figure, "the room at the end of the run, from above"))]
     for slam in slams:
         believed = run.believed(slam)
         if believed.map is None:
             continue
         figure, ax = _panel(run)
         poses = _in_world(run, believed.poses)
-        with curves.styled():
-            _image(ax, believed.map, run.truth[0])
-            ax.plot(poses[:, 0], poses[:, 1], color=curves.color(slam, slams), lw=1.1)
-        panels.append((slam, curves.svg(figure, f"the last map of {slam}")))
+        _image(ax, believed.map, run.truth[0])
+        ax.plot(poses[:, 0], poses[:, 1], color=color_of(slam, slams), lw=1.1)
+        panels.append((slam, svg(figure, f"the last map of {slam}")))
     return panels
 
 
+@styled(SVG)
 def strip(run: RunFile, slam: str, slams: Sequence[str]) -> list[tuple[float, str]]:
     """(second, SVG) at a few moments: the world from above, the true robot and the believed one."""
     believed = run.believed(slam)
@@ -66,46 +66,45 @@ def strip(run: RunFile, slam: str, slams: Sequence[str]) -> list[tuple[float, st
     for k in moments:
         second = float(run.stamps_ns[k] - run.stamps_ns[0]) / 1e9
         figure, ax = _panel(run, paths)
-        with curves.styled():
-            _image(ax, run.static_map)
-            _movers(ax, run, k)
-            ax.plot(run.truth[: k + 1, 0], run.truth[: k + 1, 1], color=curves.TRUTH, lw=0.9)
-            _robot(ax, run.truth[k], curves.TRUTH)
-            if k < len(poses):
-                color = curves.color(slam, slams)
-                points = _scan(run, k, poses[k])
-                ax.plot(points[:, 0], points[:, 1], ".", color=SCAN, ms=2.4, mew=0, zorder=4)
-                ax.plot(poses[: k + 1, 0], poses[: k + 1, 1], color=color, lw=0.9)
-                _robot(ax, poses[k], color, filled=False)
-        panels.append((second, curves.svg(figure, f"the world after {second:.1f} s")))
+        _image(ax, run.static_map)
+        _movers(ax, run, k)
+        ax.plot(run.truth[: k + 1, 0], run.truth[: k + 1, 1], color=TRUTH, lw=0.9)
+        _robot(ax, run.truth[k], TRUTH)
+        if k < len(poses):
+            color = color_of(slam, slams)
+            points = _scan(run, k, poses[k])
+            ax.plot(points[:, 0], points[:, 1], ".", color=SCAN, ms=2.4, mew=0, zorder=4)
+            ax.plot(poses[: k + 1, 0], poses[: k + 1, 1], color=color, lw=0.9)
+            _robot(ax, poses[k], color, filled=False)
+        panels.append((second, svg(figure, f"the world after {second:.1f} s")))
     return panels
 
 
+@styled(SVG)
 def errors(run: RunFile, slams: Sequence[str]) -> str:
     """SVG: position error over time for every SLAM; below it what share of the beams met movers."""
-    figure = curves.new_figure(8.0, 3.6)
+    figure = Figure(figsize=(8.0, 3.6), layout="constrained")
     truth = in_first_frame(Trajectory(stamps_ns=run.stamps_ns, poses=run.truth))
-    with curves.styled():
-        above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0))
-        for slam in slams:
-            said = run.believed(slam)
-            if len(said.stamps_ns) == 0:
-                continue
-            track = Trajectory(stamps_ns=said.stamps_ns, poses=said.poses)
-            seconds, offset, _ = error_series(track, truth)
-            color = curves.color(slam, slams)
-            above.plot(seconds, offset * 100.0, color=color, lw=1.4)
-            if len(said.stamps_ns) < len(run.stamps_ns):  # it failed there
-                above.plot(seconds[-1], offset[-1] * 100.0, "x", color=color, ms=8, mew=2)
-        above.axhline(LOST_M * 100.0, color=curves.MUTED, lw=0.8, ls=":")
-        curves.remark(above, LOST_M * 100.0, "lost", curves.MUTED)
-        log_axis(above)
-        above.set_ylabel("position error, cm")
-        seconds = (run.stamps_ns - run.stamps_ns[0]) / 1e9
-        below.fill_between(seconds, moving_share(run) * 100.0, color=MOVING, alpha=0.55, lw=0)
-        below.set(xlabel="time, s", ylabel="moving, %", ylim=(0.0, None))
-        below.margins(x=0.01)
-    return curves.svg(figure, "position error over time, and the share of beams on moving things")
+    above, below = figure.subplots(2, 1, sharex=True, height_ratios=(3.2, 1.0))
+    for slam in slams:
+        said = run.believed(slam)
+        if len(said.stamps_ns) == 0:
+            continue
+        track = Trajectory(stamps_ns=said.stamps_ns, poses=said.poses)
+        seconds, offset, _ = figures.error_series(track, truth)
+        color = color_of(slam, slams)
+        above.plot(seconds, offset * 100.0, color=color, lw=1.4)
+        if len(said.stamps_ns) < len(run.stamps_ns):  # it failed there
+            above.plot(seconds[-1], offset[-1] * 100.0, "x", color=color, ms=8, mew=2)
+    above.axhline(LOST_M * 100.0, color=figures.MUTED, lw=0.8, ls=":")
+    figures.remark(above, LOST_M * 100.0, "lost", figures.MUTED)
+    figures.log_axis(above)
+    above.set_ylabel("position error, cm")
+    seconds = (run.stamps_ns - run.stamps_ns[0]) / 1e9
+    below.fill_between(seconds, moving_share(run) * 100.0, color=MOVING, alpha=0.55, lw=0)
+    below.set(xlabel="time, s", ylabel="moving, %", ylim=(0.0, None))
+    below.margins(x=0.01)
+    return svg(figure, "position error over time, and the share of beams on moving things")
 
 
 def moving_share(run: RunFile) -> Float:
@@ -131,21 +130,20 @@ def _panel(run: RunFile, paths: Float | None = None) -> tuple[Figure, Axes]:
             low, high = near, far
     (x, y), (width, height) = low.tolist(), (high - low).tolist()
     shape = min(max(height / width, 0.4), 1.6)
-    figure = curves.new_figure(_PANEL, _PANEL * shape, margins=False)
-    with curves.styled():
-        ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
-        ax.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal", xticks=[], yticks=[])
-        ax.grid(visible=False)
-        ax.set_facecolor("#e6e8eb")
-        for spine in ax.spines.values():
-            spine.set_visible(False)
-        meters = 10.0 ** math.floor(math.log10(width / 3.0))
-        at = (x + 0.06 * width, y + 0.06 * height)
-        rim = [withStroke(linewidth=2.0, foreground="white")]  # a box would hide what is there
-        ax.plot([at[0], at[0] + meters], [at[1], at[1]], color=curves.INK, lw=2.0, zorder=6,
-                path_effects=rim)  # fmt: skip
-        ax.annotate(f"{meters:g} m", at, xytext=(0, 4), textcoords="offset points", fontsize=9,
-                    zorder=6, path_effects=rim)  # fmt: skip
+    figure = Figure(figsize=(_PANEL, _PANEL * shape))
+    ax = figure.add_axes((0.0, 0.0, 1.0, 1.0))
+    ax.set(xlim=(x, x + width), ylim=(y, y + height), aspect="equal", xticks=[], yticks=[])
+    ax.grid(visible=False)
+    ax.set_facecolor("#e6e8eb")
+    for spine in ax.spines.values():
+        spine.set_visible(False)
+    meters = 10.0 ** math.floor(math.log10(width / 3.0))
+    at = (x + 0.06 * width, y + 0.06 * height)
+    rim = [withStroke(linewidth=2.0, foreground="white")]  # a box would hide what is there
+    ax.plot([at[0], at[0] + meters], [at[1], at[1]], color=figures.INK, lw=2.0, zorder=6,
+            path_effects=rim)  # fmt: skip
+    ax.annotate(f"{meters:g} m", at, xytext=(0, 4), textcoords="offset points", fontsize=9,
+                zorder=6, path_effects=rim)  # fmt: skip
     return figure, ax
 
 

@@ -3,22 +3,22 @@
 
 import math
 from collections.abc import Sequence
+from dataclasses import replace
 from typing import Any
 
-from rich.markup import escape
-from rich.table import Table
+from rich.table import Table as Printed
 
 from scripts.comparison.schema import ANEW
 from scripts.comparison.tables import grouped
-from scripts.console import plain_table
 from scripts.days.scores import SCORES, Row, Score, first_words, levels
 from scripts.metrics.table import digits
+from scripts.pages.table import NONE, Cell, Table
 from scripts.report.answer import percent
 from scripts.report.study import LEAST_RUNS
 
-NONE = "–"
 STARTS_ANEW = "starts anew: cannot load a map"
-_ANEW, _DAYS = ("starts anew", "cannot load a map"), ("loaded", "in each session")
+_ANEW = Cell(text="starts anew", small="cannot load a map")
+_LOADED = Cell(text="loaded", small="in each session")
 _PRINTED = (
     "found_share", "found_soon_share", "wrong_share", "rmse_session0_m", "rmse_session1_m",
     "rmse_last_m", "rmse_growth", "rmse_age1_m", "rmse_age3_m", "rmse_age10_m", "ghost_rate_early",
@@ -26,7 +26,6 @@ _PRINTED = (
     "failed_share",
 )  # fmt: skip
 Group = tuple[Any, ...]  # scene, motion, change
-Cells = list[tuple[str, str]]  # text and small print of each SLAM
 
 
 def groups(rows: Sequence[Row]) -> dict[Group, list[Row]]:
@@ -51,53 +50,42 @@ def slams_of(rows: Sequence[Row]) -> list[str]:
     return list(dict.fromkeys(str(row["slam"]) for row in rows))
 
 
-def table(rows: Sequence[Row], scores: Sequence[Score] = SCORES) -> list[tuple[str, Cells]]:
-    """Of one group: for each score its heading, and the cells of the SLAMs (``slams_of``).
+def table(rows: Sequence[Row], scores: Sequence[Score] = SCORES) -> Table:
+    """Of one group: a row for each score, a column for each SLAM.
 
     A score that no SLAM has is left out, so are failures where nothing failed.
     """
     names = slams_of(rows)
     found = {(row["slam"], row["metric"]): row for row in levels(rows)}
     kinds = {row["slam"]: row["map"] for row in rows}
-    out: list[tuple[str, Cells]] = [
-        ("map", [_ANEW if kinds[name] == ANEW else _DAYS for name in names])
-    ]
+    lines = [[Cell(text="map"), *(_ANEW if kinds[name] == ANEW else _LOADED for name in names)]]
     for score in scores:
         own = [found.get((name, score.key)) for name in names]
         there = [row for row in own if row is not None]
         if not there or (score.key == "failed_share" and not any(r["value"] for r in there)):
             continue
-        out.append((score.heading, [_cell(score, row) for row in own]))
-    return out
+        lines.append([Cell(text=score.heading), *(_cell(score, row) for row in own)])
+    return Table(caption=size(rows), head=["score", *names], rows=lines, slams=names)
 
 
-def _cell(score: Score, row: Row | None) -> tuple[str, str]:
+def _cell(score: Score, row: Row | None) -> Cell:
     """The value, and its interval where there are enough of them."""
     if row is None:
-        return NONE, ""
+        return Cell(text=NONE)
     n = int(row["n"])
     if score.hits:
         hits = round(row["value"] * n)
-        return f"{hits} of {n}", percent(hits, n)
+        return Cell(text=f"{hits} of {n}", small=percent(hits, n))
     ends = [score.factor * row[end] for end in ("low", "high")]
     small = " to ".join(map(digits, ends)) if n >= LEAST_RUNS and ends != [math.inf] * 2 else ""
-    return digits(score.factor * row["value"]), small
+    return Cell(text=digits(score.factor * row["value"]), small=small)
 
 
-def printed(group: Group, rows: Sequence[Row]) -> Table:
-    """Of one group for the terminal: a column for each SLAM."""
-    found = plain_table(f"{where(group)}: {size(rows)}")
-    found.add_column("")
-    for name in slams_of(rows):
-        found.add_column(escape(name), justify="right", overflow="fold")
-    for heading, cells in table(rows, [score for score in SCORES if score.key in _PRINTED]):
-        found.add_row(heading, *(escape(both(*cell)) for cell in cells))
-    return found
-
-
-def both(text: str, small: str) -> str:
-    """A cell with its small print in brackets."""
-    return f"{text} [{small}]" if small else text
+def printed(group: Group, rows: Sequence[Row]) -> Printed:
+    """Of one group for the terminal: the scores that matter most."""
+    found = table(rows, [score for score in SCORES if score.key in _PRINTED])
+    caption = f"{where(group)}: {found.caption}"
+    return replace(found, caption=caption, head=["", *found.slams]).printed()
 
 
 def sentences(rows: Sequence[Row]) -> list[str]:

@@ -2,8 +2,7 @@
 """A comparison's tables, looked up by scene, level and SLAM, and what may be said of them."""
 
 import os
-from collections import Counter
-from collections.abc import Container
+from collections.abc import Container, Iterable
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
@@ -14,12 +13,14 @@ from scripts.comparison.folder import Compared, read
 from scripts.comparison.run_file import RunFile
 from scripts.comparison.schema import LEVELS, PAIRED, RUNS
 from scripts.comparison.tables import Row
+from scripts.metrics.table import METRICS, Metric
 from scripts.names import DATASET
 from scripts.output import RECIPE, read_recipe_words
 from slam.errors import LogFormatError, MissingPathError
 from slam.shaped import one_of
 
 LEAST_RUNS = 6  # with fewer not even all wins are unlikely enough by chance (sign test, 5 %)
+_SIGNED = ("median_difference", "low", "high")
 WORST = 3  # runs of a scene that the page lists
 
 
@@ -87,6 +88,10 @@ class Study:
         """Whether any SLAM has that number."""
         return any(row["metric"] == metric for row in self.compared.levels)
 
+    def measures(self, keys: Iterable[str]) -> list[Metric]:
+        """Those metrics that any SLAM has."""
+        return [METRICS[key] for key in keys if self.has(key)]
+
     @cached_property
     def _by_pair(self) -> dict[tuple[str, float, str, str, str], Row]:
         found = {}
@@ -107,14 +112,6 @@ class Study:
             for row in self.compared.runs
             if (row["scene"], row["dynamism"], row["slam"]) == (scene, dynamism, slam)
         ]
-
-    def outcomes(self, scene: str, slam: str) -> Counter[str]:
-        """How its runs ended."""
-        return Counter(
-            row["outcome"]
-            for row in self.compared.runs
-            if (row["scene"], row["slam"]) == (scene, slam)
-        )
 
     @cached_property
     def least_runs(self) -> int:
@@ -156,21 +153,12 @@ def _badness(row: Row) -> float:
 
 def _turned(row: Row) -> Row:
     """The same pair the other way round."""
-    low, high = row["low"], row["high"]
+    minus = {key: None if row[key] is None else -row[key] for key in _SIGNED}
     return {
-        **row,
-        "slam_a": row["slam_b"],
-        "slam_b": row["slam_a"],
-        "median_difference": _minus(row["median_difference"]),
-        "low": _minus(high),
-        "high": _minus(low),
-        "wins": row["losses"],
-        "losses": row["wins"],
-    }
-
-
-def _minus(value: float | None) -> float | None:
-    return None if value is None else -value
+        **row, "slam_a": row["slam_b"], "slam_b": row["slam_a"], "wins": row["losses"],
+        "losses": row["wins"], "median_difference": minus["median_difference"],
+        "low": minus["high"], "high": minus["low"],
+    }  # fmt: skip
 
 
 def verdict(row: Row, less_is_better: bool) -> int:

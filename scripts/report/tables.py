@@ -1,17 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
-"""The tables of the report, as heads and rows of cells."""
+"""The tables of the report."""
 
 import math
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
-from typing import Any
 
 from scripts.closed_loop.tables import Driven
 from scripts.comparison.schema import OUTCOMES
 from scripts.comparison.tables import Row, by_seed, number
 from scripts.metrics.table import METRICS, Metric, digits
-from scripts.pages.page import Cell, Table
+from scripts.pages.table import NONE, Cell, Table, grid
 from scripts.report.answer import percent
 from scripts.report.curves import PRECISION, SUCCESS, few_goals
 from scripts.report.study import LEAST_RUNS, Study, verdict
@@ -19,33 +18,49 @@ from slam.evaluation.statistics import quantile, ratio_interval
 from slam.variants import ORACLE
 
 _MARKS = {1: "better", -1: "worse", 0: ""}
+_ATE, _LOST = METRICS["ate_unaligned_m"], METRICS["lost"]
 
 
-def _label(of: str | float | Metric) -> str:
-    """What a row or a column is called."""
-    return of if isinstance(of, str) else of.heading if isinstance(of, Metric) else f"{of:g}"
+def _by_measure(
+    study: Study,
+    where: str,
+    having: Mapping[Metric, Sequence[str]],
+    cell: Callable[[Metric, float, str], Cell],
+    minus: str = "",
+) -> list[Table]:
+    """A table for each measure: a row for each level, a column for each SLAM that has it.
 
+    One table for all with a single level (a row for each SLAM), and for the measures that one SLAM
+    alone has. ``minus``: whose difference from each of these it is.
+    """
+    if len(study.levels) == 1 and having:
+        at = study.levels[0]
+        having_any = [slam for slam in study.slams if any(slam in own for own in having.values())]
+        corner = f"{minus} minus" if minus else "SLAM"
+        return [
+            grid(f"{where} at {study.axis} {at:g}", corner, having_any, list(having),
+                 lambda slam, metric: cell(metric, at, slam))
+        ]  # fmt: skip
 
-def _grid(
-    caption: str,
-    corner: str,
-    rows: Sequence[Any],
-    columns: Sequence[Any],
-    cell: Callable[[Any, Any], Cell],
-    slams: Sequence[str] = (),
-) -> Table:
-    """A row for each of ``rows``, a column for each of ``columns``."""
-    lines = [[Cell(text=_label(row)), *(cell(row, column) for column in columns)] for row in rows]
-    head = [corner, *map(_label, columns)]
-    return Table(caption=caption, head=head, rows=lines, slams=slams)
+    def of_one(slam: str) -> Callable[[float, Metric], Cell]:
+        return lambda level, metric: cell(metric, level, slam)
+
+    found, single = [], dict[str, list[Metric]]()
+    for metric, slams in having.items():
+        if len(slams) == 1:
+            single.setdefault(slams[0], []).append(metric)
+            continue
+        caption = f"{metric.heading}: {minus} minus …" if minus else metric.heading
+        own = partial(cell, metric)
+        found.append(grid(caption, study.axis, study.levels, slams, own, slams=slams))
+    for slam, metrics in single.items():
+        caption = f"{minus} minus {slam}" if minus else slam
+        found.append(grid(caption, study.axis, study.levels, metrics, of_one(slam)))
+    return found
 
 
 def of_levels(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]:
-    """Medians (shares) with their 95 % intervals of the measures that any SLAM has.
-
-    A table for each measure: a row for each level, a column for each SLAM. One table for all with a
-    single level (a row for each SLAM), and for the measures that one SLAM alone has.
-    """
+    """Medians (shares) with their 95 % intervals of the measures that any SLAM has."""
     having = {
         metric: [
             slam for slam in study.slams
@@ -62,29 +77,7 @@ def of_levels(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table
         is_best = row in rated and row and not study.few and row["value"] == _best(rated, metric)
         return _value(row, metric, "best" if is_best else "")
 
-    if len(study.levels) == 1 and having:
-        slams = [slam for slam in study.slams if any(slam in own for own in having.values())]
-        at = study.levels[0]
-        return [
-            _grid(f"{scene} at {study.axis} {at:g}", "SLAM", slams, list(having),
-                  lambda slam, metric: cell(metric, at, slam))
-        ]  # fmt: skip
-    alone: dict[str, list[Metric]] = {}
-    for metric, slams in having.items():
-        if len(slams) == 1:
-            alone.setdefault(slams[0], []).append(metric)
-    return [
-        *(
-            _grid(metric.heading, study.axis, study.levels, slams,
-                  partial(cell, metric), slams)
-            for metric, slams in having.items() if len(slams) > 1
-        ),
-        *(
-            _grid(slam, study.axis, study.levels, own,
-                  lambda level, metric: cell(metric, level, having[metric][0]))
-            for slam, own in alone.items()
-        ),
-    ]  # fmt: skip
+    return _by_measure(study, scene, having, cell)
 
 
 def _best(rows: Sequence[Row | None], metric: Metric) -> float | None:
@@ -97,7 +90,7 @@ def _best(rows: Sequence[Row | None], metric: Metric) -> float | None:
 def _value(row: Row | None, metric: Metric, mark: str = "") -> Cell:
     """With its interval; of too few runs without, and of shares the count."""
     if row is None:
-        return Cell(text="–")
+        return Cell(text=NONE)
     if row["n"] < LEAST_RUNS:
         return _count(row) if metric.summary == "share" else Cell(text=metric.show(row["value"]))
     ends = (row["low"], row["high"])
@@ -108,42 +101,25 @@ def _value(row: Row | None, metric: Metric, mark: str = "") -> Cell:
 def _count(row: Row | None) -> Cell:
     """Of a share how many of how many, with its interval."""
     if row is None:
-        return Cell(text="–")
+        return Cell(text=NONE)
     hits, runs = round(row["value"] * row["n"]), int(row["n"])
     return Cell(text=f"{hits} of {runs}", small=percent(hits, runs))
 
 
 def of_pairs(study: Study, scene: str, metrics: Sequence[Metric]) -> list[Table]:
-    """The subject against each rival: median difference, its interval, wins-ties-losses.
-
-    A table for each measure: a row for each level, a column for each rival. One table for all
-    measures with a single rival, or a single level.
-    """
-    subject, rivals, levels = study.subject, study.rivals, study.levels
+    """The subject against each rival: median difference, its interval, wins-ties-losses."""
+    subject = study.subject
 
     def cell(metric: Metric, level: float, rival: str) -> Cell:
         return _difference(study.pair(scene, level, metric.key, subject, rival), metric)
 
-    if len(rivals) == 1:
-        return [
-            _grid(f"{subject} minus {rivals[0]}", study.axis, levels, metrics,
-                  lambda level, metric: cell(metric, level, rivals[0]))
-        ]  # fmt: skip
-    if len(levels) == 1:
-        return [
-            _grid(f"{scene} at {study.axis} {levels[0]:g}", f"{subject} minus", rivals, metrics,
-                  lambda rival, metric: cell(metric, levels[0], rival))
-        ]  # fmt: skip
-    return [
-        _grid(f"{metric.heading}: {subject} minus …", study.axis, levels, rivals,
-              partial(cell, metric), rivals)
-        for metric in metrics
-    ]  # fmt: skip
+    having = dict.fromkeys(metrics, study.rivals) if study.rivals else {}
+    return _by_measure(study, scene, having, cell, minus=subject)
 
 
 def _difference(row: Row | None, metric: Metric) -> Cell:
     if row is None:
-        return Cell(text="–")
+        return Cell(text=NONE)
     ends = [metric.show(row[end], sign=True) for end in ("low", "high")]
     interval = f"{ends[0]} to {ends[1]}\n" if row["n"] >= LEAST_RUNS else ""
     return Cell(
@@ -158,73 +134,74 @@ def of_outcomes(study: Study) -> list[Table]:
 
     At one level it is one table with a column for each scene.
     """
-
-    def cell(scene: str, slam: str, level: float) -> Cell:
-        ended = Counter(row["outcome"] for row in study.runs(scene, level, slam))
-        rest = [f"{ended[word]} {word}" for word in OUTCOMES[1:] if ended[word]]
-        text = f"{ended['finished']} of {ended.total()}"
-        return Cell(text=text, small=", ".join(rest), mark="worse" if rest else "")
-
     head = f"finished at {study.axis}"
     if len(study.levels) == 1:
         at = study.levels[0]
         return [
-            _grid(f"{head} {at:g}", "finished", study.slams, study.scenes,
-                  lambda slam, scene: cell(scene, slam, at))
+            grid(f"{head} {at:g}", "finished", study.slams, study.scenes,
+                 lambda slam, scene: _ended(study, scene, slam, at))
         ]  # fmt: skip
     return [
-        _grid(scene, head, study.slams, study.levels,
-              partial(cell, scene))
+        grid(scene, head, study.slams, study.levels, partial(_ended, study, scene))
         for scene in study.scenes
-    ]  # fmt: skip
+    ]
+
+
+def _ended(study: Study, scene: str, slam: str, level: float) -> Cell:
+    ended = Counter(row["outcome"] for row in study.runs(scene, level, slam))
+    rest = [f"{ended[word]} {word}" for word in OUTCOMES[1:] if ended[word]]
+    text = f"{ended['finished']} of {ended.total()}"
+    return Cell(text=text, small=", ".join(rest), mark="worse" if rest else "")
 
 
 def growth(study: Study, scene: str) -> Table:
     """What the axis does to each SLAM: from the lowest level to the highest."""
-    ate, lost = METRICS["ate_unaligned_m"], METRICS["lost"]
     ends = (study.levels[0], study.levels[-1])
-    rows = []
-    for slam in study.slams:
-        found = [study.level(scene, end, slam, ate.key) for end in ends]
-        shares = [study.level(scene, end, slam, lost.key) for end in ends]
-        rows.append([
-            Cell(text=slam), *(_value(row, ate) for row in found), _growth(study, scene, slam),
-            *(_count(row) for row in shares),
-        ])  # fmt: skip
-    head = [f"{ate.name} at {end:g}, {ate.shown}" for end in ends]
-    lost_head = [f"{lost.name} at {end:g}" for end in ends]
+    rows = [
+        [
+            Cell(text=slam),
+            *(_value(study.level(scene, end, slam, _ATE.key), _ATE) for end in ends),
+            _growth(study, scene, slam),
+            *(_count(study.level(scene, end, slam, _LOST.key)) for end in ends),
+        ]
+        for slam in study.slams
+    ]
+    heads = [f"{_ATE.name} at {end:g}, {_ATE.shown}" for end in ends]
+    lost = [f"{_LOST.name} at {end:g}" for end in ends]
     caption = f"From {study.axis} {ends[0]:g} to {ends[1]:g}"
-    return Table(caption=caption, head=["SLAM", *head, "grows", *lost_head], rows=rows)
+    return Table(caption=caption, head=["SLAM", *heads, "grows", *lost], rows=rows)
 
 
 def _growth(study: Study, scene: str, slam: str) -> Cell:
     """The ratio of the medians at both ends over the same seeds, with its interval."""
     low, high = (
-        by_seed(study.runs(scene, end, slam), slam, "ate_unaligned_m")
+        by_seed(study.runs(scene, end, slam), slam, _ATE.key)
         for end in (study.levels[0], study.levels[-1])
     )
     seeds = sorted(low.keys() & high.keys())
     before, after = [low[seed] for seed in seeds], [high[seed] for seed in seeds]
     if len(seeds) < LEAST_RUNS or not 0.0 < quantile(before, 0.5) < math.inf:
-        return Cell(text="–")
+        return Cell(text=NONE)
     interval = " to ".join(map(digits, ratio_interval(before, after)))
     return Cell(text=digits(quantile(after, 0.5) / quantile(before, 0.5)) + " ×", small=interval)
 
 
 def worst(study: Study, scene: str) -> Table:
     """The worst runs of the subject: how each ended, and how far it was from the truth."""
-    ate = METRICS["ate_unaligned_m"]
-    rows = []
-    for row in study.worst(scene, study.subject):
-        at = row["lost_at_s"]
-        cells = [f"{row['dynamism']:g}", f"{row['seed']:g}", str(row["outcome"])]
-        cells += [ate.show(number(row, ate.key)), "–" if at is None else f"{at:.1f}"]
-        rows.append([Cell(text=text) for text in cells])
-    head = [study.axis, "seed", "outcome", f"{ate.name}, {ate.shown}", "lost at, s"]
-    return Table(caption=f"Worst runs of {study.subject} in {scene}", head=head, rows=rows)
+    rows = [
+        (f"{row['dynamism']:g}", f"{row['seed']:g}", str(row["outcome"]),
+         _ATE.show(number(row, _ATE.key)),
+         NONE if row["lost_at_s"] is None else f"{row['lost_at_s']:.1f}")
+        for row in study.worst(scene, study.subject)
+    ]  # fmt: skip
+    return Table(
+        caption=f"Worst runs of {study.subject} in {scene}",
+        head=[study.axis, "seed", "outcome", f"{_ATE.name}, {_ATE.shown}", "lost at, s"],
+        rows=[[Cell(text=text) for text in row] for row in rows],
+    )
 
 
-def costs(study: Study, keys: Sequence[str]) -> Table:
+def costs(study: Study, metrics: Sequence[Metric]) -> Table:
     """A row for each SLAM: medians over all runs' levels, per measure."""
 
     def cell(slam: str, metric: Metric) -> Cell:
@@ -235,55 +212,41 @@ def costs(study: Study, keys: Sequence[str]) -> Table:
         return Cell(text=metric.show(found[len(found) // 2] if found else None), small=span)
 
     caption = "middle of the medians of all scenes and levels, and their range"
-    metrics = [METRICS[key] for key in keys if study.has(key)]
-    return _grid(caption, "SLAM", study.slams, metrics, cell)
+    return grid(caption, "SLAM", study.slams, metrics, cell)
 
 
 def of_drive(drive: Driven) -> Table:
     """Of ``mobilia drive``: a row for each SLAM and level."""
-    rows = [
-        [
-            Cell(text=str(row["slam"])),
-            Cell(text=f"{row['dynamism']:g}"),
-            Cell(
-                text=f"{row['reached']:g} of {row['goals']:g}",
-                small=_interval(row),
-            ),
-            *(Cell(text=f"{row[key]:g}") for key in ("wrong", "given_up", "failed")),
-            _precision(row),
-            *(_number(row[key]) for key in ("time_s", "collisions_per_km", "near_misses_per_km")),
-            _lost(row),
-        ]
-        for slam in drive.slams
-        for row in drive.of(slam)
-    ]  # fmt: skip
     head = ["SLAM", drive.axis, "reached", "wrong", "given up", "failed", "precision, cm",
             "time, s", "collisions per km", "near misses per km", "runs lost"]  # fmt: skip
+    rows = [_driven(row) for slam in drive.slams for row in drive.of(slam)]
     return Table(caption=drive.scene, head=head, rows=rows)
 
 
-def _interval(row: Row) -> str:
-    if few_goals(row, SUCCESS):
-        return ""
-    return f"{100.0 * row['success_low']:.0f} to {100.0 * row['success_high']:.0f} %"
-
-
-def _lost(row: Row) -> Cell:
-    interval = percent(int(row["runs_lost"]), int(row["runs"]))
-    recovered = f"{row['runs_recovered']:g} recovered"
-    return Cell(
-        text=f"{row['runs_lost']:g} of {row['runs']:g}",
-        small=f"{interval}\n{recovered}" if interval else recovered,
-    )
-
-
-def _precision(row: Row) -> Cell:
+def _driven(row: Row) -> list[Cell]:
+    success = between = ""
+    if not few_goals(row, SUCCESS):
+        success = f"{100.0 * row['success_low']:.0f} to {100.0 * row['success_high']:.0f} %"
     low, high = (row[key] for key in PRECISION[1:])
-    small = ""
     if not few_goals(row, PRECISION) and low is not None and high is not None:
-        small = f"{digits(100 * low)} to {digits(100 * high)}"
-    return Cell(text=_number(row["precision_m"], 100.0).text, small=small)
+        between = f"{digits(100 * low)} to {digits(100 * high)}"
+    lost = [
+        percent(int(row["runs_lost"]), int(row["runs"])),
+        f"{row['runs_recovered']:g} recovered",
+    ]
+    return [
+        Cell(text=str(row["slam"])),
+        Cell(text=f"{row['dynamism']:g}"),
+        Cell(text=f"{row['reached']:g} of {row['goals']:g}", small=success),
+        *(Cell(text=f"{row[key]:g}") for key in ("wrong", "given_up", "failed")),
+        Cell(text=_number(row["precision_m"], 100.0), small=between),
+        *(
+            Cell(text=_number(row[key]))
+            for key in ("time_s", "collisions_per_km", "near_misses_per_km")
+        ),
+        Cell(text=f"{row['runs_lost']:g} of {row['runs']:g}", small="\n".join(filter(None, lost))),
+    ]
 
 
-def _number(value: float | None, factor: float = 1.0) -> Cell:
-    return Cell(text="–" if value is None else digits(value * factor))
+def _number(value: float | None, factor: float = 1.0) -> str:
+    return NONE if value is None else digits(value * factor)

@@ -50,21 +50,21 @@ def beside_sheet(scanner: str, out: Path | None) -> None:
     Raises ``MobiliaError`` where the scanner departs from its data sheet.
     """
     from scripts.card import page, rows, stated
-    from sim.sensors.lidar.registry import DEFAULT, describe
+    from sim.sensors.lidar.registry import DEFAULT
     from slam.files import make_folder
 
     usual = scanner == DEFAULT
     with working("measuring"):
         measured = rows.rows() if usual else stated.rows_of(scanner)
-    cells = [row.cells() for row in measured]
-    console.print(page.printed(f"{describe(scanner)} (simulated)", rows.HEADINGS, cells))
+    table = page.table(scanner, measured)
+    console.print(table.printed(ruled=True))
     if out is not None:
         if usual:
             make_folder(out / "pictures")
             with working("drawing what each effect does"):
                 page.draw(out / "pictures" / "sensor_ablation.png")
         name = "sensor_card" if usual else f"sensor_card_{scanner}"
-        note(f"wrote {page.write(out, name, page.page(scanner, measured))}")
+        note(f"wrote {page.write(out, name, page.page(scanner, table))}")
     broken = [row.what for row in measured if not row.kept]
     if broken:
         raise MobiliaError(f"the scanner departs from its data sheet: {'; '.join(broken)}")
@@ -84,11 +84,10 @@ def beside_log(
     name = like(real["log"], scanner)
     with working("simulating and measuring"):
         ours = {name: simulated_card(name)}
-    title = "value (95 % interval, whole stretches drawn again); ≠: the intervals do not meet"
-    console.print(page.printed(title, beside.headings(real, ours), beside.rows(real, ours)))
+    console.print(beside.table(real, ours).printed(ruled=True))
     for what, card in (real | ours).items():
         note(f"{what}: {beside.amount(card)}")
     if out is not None:
         head = f"# {', '.join(log.name for log in logs)} beside {name}"
-        lines = [head, "", *beside.markdown(real, ours)]
-        note(f"wrote {page.write(out, 'real_scanner_log', lines)}")
+        text = f"{head}\n\n{beside.markdown(real, ours)}"
+        note(f"wrote {page.write(out, 'real_scanner_log', text)}")

@@ -9,6 +9,7 @@ so that it works whatever ``MUJOCO_GL`` was when mujoco was imported. A camera b
 that made it. People between a camera that rides on the robot and the robot are drawn as glass.
 """
 
+import copy
 import importlib
 from typing import Any, Self
 
@@ -91,8 +92,6 @@ class Camera:
 
         Raises ``InvalidValueError`` for a camera the model does not have.
         """
-        if self._context is None:
-            raise InvalidValueError("this Camera is closed")
         number = mujoco.mj_name2id(self._model, mujoco.mjtObj.mjOBJ_CAMERA, camera)
         if number < 0:
             known = [self._model.camera(i).name for i in range(self._model.ncam)]
@@ -115,8 +114,6 @@ class Camera:
 
         Raises ``InvalidValueError`` for what is no finite number, and for a ``far_m`` not above 0.
         """
-        if self._context is None:
-            raise InvalidValueError("this Camera is closed")
         shaped("at", at, tuple[Number, Number])
         shaped("far_m", far_m, Positive)
         for field, value in (("azimuth_deg", azimuth_deg), ("down_deg", down_deg)):
@@ -128,6 +125,8 @@ class Camera:
         return self._picture(data)
 
     def _picture(self, data: mujoco.MjData) -> NDArray[np.uint8]:
+        if self._context is None:
+            raise InvalidValueError("this Camera is closed")
         mujoco.mj_camlight(self._model, data)
         self._update(data)
         self._gl.make_current()
@@ -211,24 +210,15 @@ def soften(picture: NDArray[np.uint8]) -> NDArray[np.uint8]:
 def _make_context(
     model: mujoco.MjModel, width: int, height: int, shadows: bool, samples: int
 ) -> mujoco.MjrContext:
-    """A render context with these qualities; the model is as before afterwards."""
-    changed: list[tuple[Any, str, int]] = [
-        (model.vis.global_, "offwidth", width),
-        (model.vis.global_, "offheight", height),
-        (model.vis.quality, "offsamples", samples),
-    ]
+    """A render context with these qualities."""
+    made_of = copy.copy(model)
+    looks, quality = made_of.vis.global_, made_of.vis.quality
+    looks.offwidth, looks.offheight, quality.offsamples = width, height, samples
     if not shadows:
-        changed.append((model.vis.quality, "shadowsize", 0))
+        quality.shadowsize = 0
     if height <= SMALL:
-        changed += [(model.vis.quality, "numslices", 8), (model.vis.quality, "numstacks", 5)]
-    before = [(owner, field, getattr(owner, field)) for owner, field, _ in changed]
-    for owner, field, value in changed:
-        setattr(owner, field, value)
-    try:
-        context = mujoco.MjrContext(model, mujoco.mjtFontScale.mjFONTSCALE_100.value)
-    finally:
-        for owner, field, value in before:
-            setattr(owner, field, value)
+        quality.numslices, quality.numstacks = 8, 5
+    context = mujoco.MjrContext(made_of, mujoco.mjtFontScale.mjFONTSCALE_100.value)
     mujoco.mjr_setBuffer(mujoco.mjtFramebuffer.mjFB_OFFSCREEN.value, context)
     _sample_one_level(model, context)
     return context

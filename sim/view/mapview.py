@@ -13,7 +13,7 @@ from typing import NamedTuple
 
 import cv2
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from scenes.scene import Scene
 from sim.core.bodies import STATIC
@@ -161,22 +161,16 @@ class MapView:
 
 def _outlines(scene: Scene) -> list[_Outline]:
     """Of all that is seen of a scene, in the order in which it is drawn."""
-    parts, corners = Parts(scene), dict[int, list[Float]]()
-    colors, owners = dict[int, NDArray[np.uint8]](), dict[int, int]()
+    parts, seen = Parts(scene), dict[int, tuple[Color, int, list[Float]]]()
     for batch in parts.batches:
-        for geom, points, color, owner in zip(
-            batch.geoms.tolist(),
-            parts.corners(batch, AROUND),
-            batch.colors,
-            batch.owners,
-            strict=True,
-        ):
+        corners = parts.corners(batch, AROUND)
+        rows = zip(batch.geoms.tolist(), batch.colors.tolist(), batch.owners.tolist(), strict=True)
+        for (geom, rgb, owner), points in zip(rows, corners, strict=True):
             if not parts.limbs[geom]:  # these are not where a pose alone says
-                corners.setdefault(geom, []).append(points)
-                colors[geom], owners[geom] = color, int(owner)
+                seen.setdefault(geom, (tuple(rgb), owner, []))[2].append(points)
     found = []
-    for geom, pieces in corners.items():
-        points, owner, color = np.concatenate(pieces), owners[geom], tuple(colors[geom].tolist())
+    for geom, (color, owner, pieces) in seen.items():
+        points = np.concatenate(pieces)
         top, wall = float(points[:, 2].max()), parts.is_wall(geom)
         if owner == STATIC:
             color = WALL if wall else draw.paler(color, FLOOR_PALE if top < FLOOR_M else PALE)

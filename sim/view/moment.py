@@ -7,8 +7,11 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 
 import numpy as np
+from numpy.typing import NDArray
 
+from sim.view.draw import colors_of
 from sim.view.parts import Placed
+from sim.view.scans import beams
 from slam import se2
 from slam.estimate import Estimate, Landmarks, Raster
 from slam.frames import NS_PER_S, Float, Frame
@@ -29,15 +32,17 @@ RING = 36  # corners of an ellipse
 class Shown:
     """Everything that is shown of one scan; later scans do not change it.
 
+    primary      the track whose map is shown
     number       of the frame, from 0;   seconds  since the first frame
     T_world_map  (3,) pose of the first frame; zeros where nobody knows the truth
     truth_map    (3,) true pose in the map frame, None where nobody knows it
     estimates    of every track
     placed       where the room's parts are at the scan's start, None for a log
-    raster, landmarks  the map of the first track, as it was looked at last
+    raster, landmarks  the map of the primary track, as it was looked at last
     said         what happened since the frame before
     """
 
+    primary: str
     number: int
     seconds: float
     frame: Frame
@@ -49,21 +54,38 @@ class Shown:
     landmarks: Landmarks | None
     said: tuple[str, ...]
 
-    def error(self, name: str) -> Float | None:
-        """(x m, y m, theta rad wrapped) of a track, None without truth."""
+    @property
+    def own(self) -> Estimate:
+        """Of the primary track."""
+        return self.estimates[self.primary]
+
+    @property
+    def verdict(self) -> str:
+        """What the primary track says of itself."""
+        return verdict_of(self.own)
+
+    def error(self, name: str) -> tuple[float, float]:
+        """(m, rad wrapped) that a track is off, NaN without truth."""
         if self.truth_map is None:
-            return None
-        error: Float = self.estimates[name].T_map_robot - self.truth_map
-        error[2] = se2.wrap(float(error[2]))
-        return error
+            return math.nan, math.nan
+        x, y, turned = (self.estimates[name].T_map_robot - self.truth_map).tolist()
+        return math.hypot(x, y), se2.wrap(turned)
 
     def claimed(self, name: str) -> tuple[float, float]:
         """``CLAIM`` sigma that a track claims: m along the longest axis of its ellipse, rad."""
         return claims(self.estimates[name].covariance)
 
-    def verdict(self, name: str) -> str:
-        """What a track says of itself."""
-        return verdict_of(self.estimates[name])
+    def robots(self) -> dict[str, tuple[Float, Float | None]]:
+        """Pose (3,) in the map and covariance (3, 3) by track, and those of the truth last."""
+        found: dict[str, tuple[Float, Float | None]] = {
+            name: (one.T_map_robot, one.covariance) for name, one in self.estimates.items()
+        }
+        return found if self.truth_map is None else {**found, "truth": (self.truth_map, None)}
+
+    def scan_map(self, T_map_robot: Float) -> tuple[Float, NDArray[np.uint8]]:
+        """(k, 2) m in the map and (k, 3) RGB, where beams ended for a robot there."""
+        mounted, ends, colors = beams(self.frame)
+        return se2.transform(se2.compose(T_map_robot, mounted), ends), colors
 
 
 class Path:
@@ -99,6 +121,7 @@ class Moments:
 
     primary    the track whose map is shown
     paths      in the map frame, by track and "truth"
+    colors     by track and "truth"
     T_world_map  of the map frame; None: the first frame's truth
     seconds    of the last moment
     moved      how often the primary track has moved its map
@@ -108,6 +131,7 @@ class Moments:
         self.T_world_map = T_world_map
         self.replay, self.primary = replay, primary_of(replay)
         self.paths: dict[str, Path] = {name: Path() for name in ("truth", *replay.tracks)}
+        self.colors = colors_of(list(replay.tracks))
         self._first_ns: int | None = None
         self._number, self.seconds, self.moved = -1, 0.0, 0
         self._looked_s = -math.inf
@@ -134,6 +158,7 @@ class Moments:
         self.paths["truth"].add(np.full(3, np.nan) if truth_map is None else truth_map)
         self._follow_map()
         return Shown(
+            primary=self.primary,
             number=self._number,
             seconds=self.seconds,
             frame=frame,

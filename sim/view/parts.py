@@ -9,6 +9,7 @@ import math
 from collections.abc import Sequence
 from dataclasses import dataclass
 from functools import cache
+from typing import Any
 
 import mujoco
 import numpy as np
@@ -139,24 +140,24 @@ class Parts:
 
     def _shapes(self, geom: int) -> list[tuple[str, float, tuple[float, ...]]]:
         """Shape, m along the geom's z axis, and size of all that a geom is drawn with."""
-        kind = int(self._model.geom_type[geom])
-        x, y, z = self._model.geom_size[geom].tolist()
+        kind = _GEOM(int(self._model.geom_type[geom]))
+        half = self._model.geom_size[geom].tolist()
+        x, y, z = (2.0 * size for size in half)
         if kind == _GEOM.mjGEOM_PLANE:
             xmin, ymin, xmax, ymax = self._bounds
-            ground = max(x, y) > max(xmax - xmin, ymax - ymin) or x <= 0.0  # far beyond the room
-            return [] if ground else [(BOX, 0.0, (2.0 * x, 2.0 * y, FLOOR_M))]
-        if kind == _GEOM.mjGEOM_BOX:
-            return [(BOX, 0.0, (2.0 * x, 2.0 * y, 2.0 * z))]
-        if kind == _GEOM.mjGEOM_SPHERE:
-            return [(BALL, 0.0, (2.0 * x, 2.0 * x, 2.0 * x))]
-        if kind == _GEOM.mjGEOM_ELLIPSOID:
-            return [(BALL, 0.0, (2.0 * x, 2.0 * y, 2.0 * z))]
-        if kind == _GEOM.mjGEOM_CYLINDER:
-            return [(CYLINDER, 0.0, (2.0 * x, 2.0 * x, 2.0 * y))]
-        if kind == _GEOM.mjGEOM_CAPSULE:
-            ends = [(BALL, along, (2.0 * x, 2.0 * x, 2.0 * x)) for along in (-y, y)]
-            return [(CYLINDER, 0.0, (2.0 * x, 2.0 * x, 2.0 * y)), *ends]
-        return []
+            ground = max(half[:2]) > max(xmax - xmin, ymax - ymin) or x <= 0.0  # far beyond
+            return [] if ground else [(BOX, 0.0, (x, y, FLOOR_M))]
+        rod = (CYLINDER, 0.0, (x, x, y))
+        shapes: dict[Any, list[tuple[str, float, tuple[float, ...]]]] = {
+            _GEOM.mjGEOM_BOX: [(BOX, 0.0, (x, y, z))],
+            _GEOM.mjGEOM_SPHERE: [(BALL, 0.0, (x, x, x))],
+            _GEOM.mjGEOM_ELLIPSOID: [(BALL, 0.0, (x, y, z))],
+            _GEOM.mjGEOM_CYLINDER: [rod],
+            _GEOM.mjGEOM_CAPSULE: [
+                rod, *((BALL, along, (x, x, x)) for along in (-half[1], half[1]))
+            ],
+        }  # fmt: skip
+        return shapes.get(kind, [])
 
     def _rgba(self, geom: int) -> Float:
         """Of its material, paper of a texture blended in, else its own."""
@@ -179,15 +180,15 @@ class Parts:
         parts: list[tuple[int, float, tuple[float, ...]]],
         owner: NDArray[np.int64],
     ) -> Batch:
-        geoms = np.array([geom for geom, _, _ in parts])
+        geoms, along, sizes = (np.array(column) for column in zip(*parts, strict=True))
         rgba = np.array([self._rgba(geom) for geom in geoms.tolist()])
         return Batch(
             shape=key[0],
             moves=key[1],
             glass=key[2],
             geoms=geoms,
-            along=np.array([along for _, along, _ in parts]),
-            sizes=np.array([size for _, _, size in parts]),
+            along=along,
+            sizes=sizes,
             colors=np.round(255.0 * np.clip(rgba[:, :3], 0.0, 1.0)).astype(np.uint8),
             opacity=rgba[:, 3],
             owners=owner[geoms],

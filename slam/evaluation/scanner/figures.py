@@ -57,11 +57,6 @@ def key_of(key: str, low: float, high: float) -> str:
     return f"{key}.{low:g}-{high:g}"
 
 
-def exact(value: float, n: int, stretches: int) -> Figure:
-    """A property of all returns at once, which has no interval."""
-    return Figure(value=value, low=math.nan, high=math.nan, n=n, stretches=stretches)
-
-
 def ratio(
     sums: Sequence[float], counts: Sequence[float], told: Callable[[float], float] = float
 ) -> Figure:

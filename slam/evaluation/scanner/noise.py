@@ -4,12 +4,13 @@ in which steps ranges are coded, and what rounding does to noise."""
 
 import math
 from collections.abc import Callable, Sequence
+from dataclasses import replace
 from functools import partial
 
 import numpy as np
 from numpy.typing import NDArray
 
-from slam.evaluation.scanner.figures import Figure, Figures, exact, key_of, median, ratio
+from slam.evaluation.scanner.figures import NOTHING, Figure, Figures, key_of, median, ratio
 from slam.evaluation.scanner.stretches import Stretch
 from slam.evaluation.scanner.walls import SPLIT_M, Wall, smooth, walls
 from slam.frames import Float
@@ -32,7 +33,7 @@ def codes(stretches: Sequence[Stretch]) -> Figures:
     steps, step = (1e-3 * mm for mm in STEPS_MM), math.nan
     if len(every):
         step = next((s for s in steps if on_multiples(every, s).mean() >= ALL), 0.0)
-    figures = {"step": exact(step, len(every), len(returns))}
+    figures = {"step": replace(NOTHING, value=step, n=len(every), stretches=len(returns))}
     for low, high in COARSE_BINS_M:
         own = [r[(r >= low) & (r < high)] for r in returns if step]
         fives = [float(on_multiples(r, COARSE * step).sum()) for r in own]

@@ -3,6 +3,7 @@
 
 from collections.abc import Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import numpy as np
 from numpy.typing import NDArray
@@ -91,17 +92,8 @@ def _still(poses: Float) -> NDArray[np.bool_]:
 
 def _runs(still: NDArray[np.bool_]) -> Iterator[tuple[int, int]]:
     """(first, behind the last) scan of each run of standing, and of each between them."""
-    first, n = 0, len(still) + 1
-    while first < n:
-        last = first + 1
-        if last < n and still[first]:
-            while last < n and still[last - 1]:
-                last += 1
-        else:
-            while last < n and not (last < n - 1 and still[last]):
-                last += 1
-        yield first, last
-        first = last
+    first, last = np.flatnonzero(np.diff(np.r_[False, still, False])).reshape(-1, 2).T
+    return pairwise(np.unique(np.r_[0, first, last + 1, len(still) + 1]).tolist())
 
 
 def _settled(ranges: Float) -> bool:

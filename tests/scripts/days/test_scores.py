@@ -110,10 +110,10 @@ def test_the_table_and_the_sentence_say_who_starts_anew():
     ((group, own),) = score_tables.groups([*rows, anew(0)]).items()
     assert score_tables.where(group) == "room, motion 0, change 0.3"
     assert score_tables.size(own) == "6 buildings of 7 sessions"
-    cells = dict(score_tables.table(own))
-    assert cells["map"][1] == ("starts anew", "cannot load a map")
-    assert cells["sessions found"] == [("36 of 36", "90 to 100 %"), ("–", "")]
-    assert cells["error of session 1, cm"] == [("3.00", "3.00 to 3.00"), ("3.00", "")]
+    cells = {row[0].text: [str(cell) for cell in row[1:]] for row in score_tables.table(own).rows}
+    assert cells["map"][1] == "starts anew [cannot load a map]"
+    assert cells["sessions found"] == ["36 of 36 [90 to 100 %]", "–"]
+    assert cells["error of session 1, cm"] == ["3.00 [3.00 to 3.00]", "3.00"]
     assert "sessions that failed" not in cells
     mine, guest = score_tables.sentences(own)
     assert mine == (

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from scripts.film.encode import LAPSE_FPS, MOST_PICTURES, Pace
+from scripts.film.encode import FILM_S, LAPSE_FPS, MOST_PICTURES, Pace
 from scripts.single_run.session import drawn, for_file
 from sim.view import moment
 from slam import create
@@ -79,6 +79,7 @@ def test_the_film_of_a_long_log_has_a_bounded_number_of_pictures():
         assert pictures <= MOST_PICTURES + 1
         assert pictures <= scans / 6 + 60
         assert pace.fps == LAPSE_FPS
+    assert [Pace.within_a_minute(k * FILM_S).speed for k in (0.5, 10.0)] == [1.0, 10.0]
     short = Pace.of_log(20.0, 100)
     assert (short.speed, short.fps) == (1.0, 10.0)
     assert Pace.of_log(10.0, 375).fps == 30.0

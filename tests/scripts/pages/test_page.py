@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from scripts.pages.page import Page, Part, command, inline, of_printed, write
+from scripts.pages.page import Page, Part, command, inline, write
+from scripts.pages.table import Cell, grid, of_printed
 
 
 def made(folder: Path, **more) -> str:
@@ -50,3 +51,15 @@ def test_a_printed_table_has_the_same_cells_on_the_page():
     again = of_printed(table)
     assert (again.caption, again.head) == ("one two", ["what", "n"])
     assert [[cell.text for cell in row] for row in again.rows] == [["✓ a", "1"]]
+
+
+def test_a_table_is_the_same_on_the_console_and_in_markdown():
+    table = grid("what", "at", ["a|b", "[bold]"], [0.5], lambda row, at: Cell(text=row, small="x"))
+    assert table.markdown() == "| at | 0.5 |\n| --- | ---: |\n| a/b | a/b [x] |\n" + (
+        "| [bold] | [bold] [x] |"
+    )
+    again = of_printed(table.printed())
+    assert (again.caption, list(again.head)) == ("what", ["at", "0.5"])
+    assert [str(cell) for row in again.rows for cell in row] == [
+        str(cell) for row in table.rows for cell in row
+    ]

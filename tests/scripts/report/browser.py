@@ -148,14 +148,6 @@ class Browser:
                       text=key.lower() if kind == "keyDown" else "",
                       windowsVirtualKeyCode=ord(key))  # fmt: skip
 
-    def screenshot(self, path: Path) -> None:
-        """The whole page as PNG."""
-        size = self.call("Page.getLayoutMetrics")["cssContentSize"]
-        data = self.call("Page.captureScreenshot", format="png", captureBeyondViewport=True,
-                         clip={"x": 0, "y": 0, "width": size["width"], "height": size["height"],
-                               "scale": 1})["data"]  # fmt: skip
-        path.write_bytes(base64.b64decode(data))
-
     def printed(self) -> bytes:
         """The page as PDF."""
         return base64.b64decode(self.call("Page.printToPDF", preferCSSPageSize=True,

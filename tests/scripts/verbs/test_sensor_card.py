@@ -12,7 +12,7 @@ import pytest
 from scripts.card import beside, stated
 from scripts.card import rows as sensor_rows
 from scripts.card.beside import simulated
-from scripts.card.page import page
+from scripts.card.page import page, table
 from scripts.card.rows import Row
 from scripts.verbs.sensor_card import sensor_card
 from sim.sensors.lidar.registry import scanner_of
@@ -63,7 +63,7 @@ def test_every_row_of_another_scanner_agrees_with_its_data_sheet(name: str) -> N
     for row in sheet:
         assert (row.value is None) == row.text.startswith(NOT_STATED)
         assert row.source or row.value is None
-    assert f"| {rows[0].what} |" in "\n".join(page(name, rows))
+    assert f"| {rows[0].what} |" in page(name, table(name, rows))
 
 
 # -- beside real logs -----------------------------------------------------------------------------
@@ -100,12 +100,12 @@ def test_cards_side_by_side_as_table_and_picture(
     cards: dict[str, ScannerCard], tmp_path: Path
 ) -> None:
     less, ours = {"less": cards["0.0047"]}, {"usual": cards["0.01"]}
-    text = beside.markdown(less, ours)
+    text = beside.markdown(less, ours).splitlines()
     (row,) = (line for line in text if line.startswith("| noise of a standing robot |"))
     assert f"| {beside.DIFFERS} |" in row
     assert not any("range, 2 to 4 m" in line for line in text)
-    assert any("2 to 4 m" in what for what, *_ in beside.rows(less, ours))
-    verdicts = {row[3] for row in beside.rows({"again": cards["0.01"]}, ours)}
+    assert any("2 to 4 m" in row[0].text for row in beside.table(less, ours).rows)
+    verdicts = {row[3].text for row in beside.table({"again": cards["0.01"]}, ours).rows}
     assert verdicts <= {"", beside.AGREES}
     beside.draw(tmp_path / "cards.png", less, ours)
     assert (tmp_path / "cards.png").stat().st_size > 20_000

@@ -44,17 +44,21 @@ def test_pixels_are_an_affine_picture_of_the_world(office):
     assert up - centre == pytest.approx([0.0, -view.scale])
 
 
-def test_a_mover_is_drawn_where_it_is(office, poses):
+@pytest.mark.parametrize(
+    ("kind", "place"),
+    [("robot", (-3.0, 0.3, 1.0)), ("robot", (6.0, -0.4, -2.0)), ("door", (0.0, 0.0, math.pi / 4))],
+)
+def test_a_mover_is_drawn_where_it_is_and_a_door_along_its_leaf(office, poses, kind, place):
     scene, view = office
-    robot = [m.kind for m in scene.movers].index("robot")
-    hidden = poses.copy()
-    hidden[robot] = np.nan
-    for place in ((-3.0, 0.3, 1.0), (6.0, -0.4, -2.0)):
-        moved = poses.copy()
-        moved[robot] = place
-        column, row, count = changed(view, view.draw(hidden), view.draw(moved))
-        assert [column, row] == pytest.approx(view.to_pixels([place[:2]])[0].tolist(), abs=2.0)
-        assert count > 30
+    row = [m.kind for m in scene.movers].index(kind)
+    hidden, moved = poses.copy(), poses.copy()
+    hidden[row], moved[row] = np.nan, place
+    column, line, count = changed(view, view.draw(hidden), view.draw(moved))
+    middle = np.array(place[:2])
+    if kind == "door":
+        middle += 0.5 * scene.movers[row].radius * math.cos(math.pi / 4)
+    assert [column, line] == pytest.approx(view.to_pixels([middle])[0].tolist(), abs=2.0)
+    assert count > 30
 
 
 def seen(ranges):
@@ -80,17 +84,6 @@ def test_drawing_leaves_no_trace_and_takes_any_scan(office, poses):
     for ranges in ([np.inf], [np.inf] * 5, [1e4] * 3, [1.0]):
         view.draw(poses, seen(ranges))
     np.testing.assert_array_equal(view.draw(poses), clean)
-
-
-def test_a_door_is_drawn_along_its_leaf(office, poses):
-    scene, view = office
-    door = next(k for k, m in enumerate(scene.movers) if m.kind == "door")
-    hidden, turned = poses.copy(), poses.copy()
-    hidden[door] = np.nan
-    turned[door] = (0.0, 0.0, math.pi / 4)
-    column, row, _ = changed(view, view.draw(hidden), view.draw(turned))
-    middle = 0.5 * scene.movers[door].radius * math.cos(math.pi / 4)
-    assert [column, row] == pytest.approx(view.to_pixels([(middle, middle)])[0].tolist(), abs=2.0)
 
 
 def test_wrong_numbers_are_refused(office, poses):
