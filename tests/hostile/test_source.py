@@ -44,7 +44,6 @@ STARTERS = {
     "sim/view/gl.py": "our own Python, without the working folder",
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/benches/shares.py": "perf and nm, on ourselves",
-    "scripts/benches/sides.py": "the Python of each of two checkouts",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/experiments/real_logs.py": "our own Python in each checkout, and git",
     "scripts/result_files.py": "git, for the commit of a results file",
