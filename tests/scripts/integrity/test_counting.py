@@ -13,11 +13,9 @@ from scripts.integrity.counting import (
     binned,
     most_of_time,
     most_of_trials,
-    pooled,
     stretches,
 )
 from scripts.metrics.judged import Judged
-from slam.errors import InvalidValueError
 from slam.trajectory import Trajectory
 
 HZ = 10.0
@@ -116,8 +114,6 @@ def test_bounds_at_the_ends():
     assert most_of_trials(0, 1000) == pytest.approx(3.0 / 1000, rel=0.01)
     assert most_of_trials(7, 7) == 1.0
     assert math.isnan(most_of_trials(0, 0))
-    with pytest.raises(InvalidValueError, match="hits must be 0 to 3, got 4"):
-        most_of_trials(4, 3)
 
 
 def test_the_bound_of_a_rate_inverts_the_poisson():
@@ -130,8 +126,7 @@ def test_the_bound_of_a_rate_inverts_the_poisson():
 def test_quantiles_of_bins_are_those_of_the_values_to_a_bin():
     rng = np.random.default_rng(1)
     values = np.exp(rng.normal(0.0, 1.0, 20_000))
-    bins = pooled([binned(values[:5000]), binned(values[5000:])])
-    assert sum(bins.values()) == len(values)
+    bins = [binned(values[:5000]), binned(values[5000:])]
     for share in (0.5, 0.99, 0.999):
         assert bin_quantile(bins, share) == pytest.approx(np.quantile(values, share), rel=0.045)
-    assert math.isnan(bin_quantile({}, 0.5))
+    assert math.isnan(bin_quantile([], 0.5))
