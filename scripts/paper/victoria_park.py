@@ -1,10 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Section 4.1: Victoria Park (Figs. 6 and 7, Table 1), against GPS and the known associations."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from scripts.figures import styled
 from scripts.paper import report as pages
@@ -146,35 +146,22 @@ def fig6(by_name: dict[str, Run], tracks: dict[str, Trajectory], gps: GpsTrack) 
     """Both maps whole, and one square of them."""
     fixes, things = {}, []
     for name in ("EKF", "shunting"):
-        a, T_map_gps = by_name[name].arrays, se2.inverse(first_fit(tracks[name], gps))
+        run, T_map_gps = by_name[name], se2.inverse(first_fit(tracks[name], gps))
         fixes[name] = se2.transform(T_map_gps, gps.points[good_fixes(gps)])
         things += [fixes[name], tracks[name].poses]
-        things.append(a["ellipses"] if "ellipses" in a else pages.active(*_drawn(a)))
+        things.append(run.arrays["ellipses"] if name == "EKF" else pages.active(*pages.drawn(run)))
     middle = np.median(tracks["EKF"].poses[:, :2], axis=0)
     whole, part = pages.window_over(things), pages.window_about(middle, 20.0)
-    figure, axes = pages.map_panels([whole, part], columns=2, width=11.5)
-    for k, ax in enumerate(axes):
-        name = ("EKF", "shunting")[k % 2]
-        a = by_name[name].arrays
-        if "ellipses" in a:
-            pages.draw_ellipses(
-                ax, a["ellipses"], label="landmark, 3 σ", dot=0.5 if k >= 2 else 2.5
-            )
-        else:
-            image = pages.draw_activities(ax, *_drawn(a), "Greys", swell=k < 2)
+
+    def also(ax: Axes, name: str, below: bool) -> None:
         ax.plot(*fixes[name].T, ".", color=pages.COLORS["GPS"], ms=2.0, label="GPS")
         ax.plot(*tracks[name].poses.T[:2], "-", color="#1f61be", lw=0.9, label="path")
-        (part if k >= 2 else whole).show(ax)
-        ax.set(title=f"({'abcd'[k]}) {name}, {'framed part' if k >= 2 else 'whole'}")
-    for ax in axes[:2]:
-        part.mark(ax)
-    figure.colorbar(image, ax=list(axes), shrink=0.5, aspect=40, label="activity")
-    pages.legend_below(figure, axes)
-    return figure
+        letter = "abcd"[2 * below + (name == "shunting")]
+        ax.set(title=f"({letter}) {name}, {'framed part' if below else 'whole'}")
+        if not below:
+            pages.mark(ax, part)
 
-
-def _drawn(a: Mapping[str, Any]) -> tuple[Any, Float, float]:
-    return a["activities"], a["origin"], float(a["cell"])
+    return pages.both_maps(by_name, whole, part, also, width=11.5, dots=(2.5, 0.5))
 
 
 def broken(seconds: Float, errors: Float) -> tuple[Float, Float]:
