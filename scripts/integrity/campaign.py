@@ -21,7 +21,7 @@ from typing import Any
 
 import slam
 from scripts.console import ended
-from scripts.experiments.study import add_run_options, head
+from scripts.experiments.command import add_run_options, head
 from scripts.imports import code_of
 from scripts.integrity import losses
 from scripts.integrity.counting import ALERT_M, bin_quantile, most_of_time, most_of_trials

@@ -32,7 +32,6 @@ IMPORTERS = {
     "scripts/live/replay.py": "the same",
     "scripts/live/page.py": "the same",
     "scripts/verbs/reproduce.py": "experiments of ours",
-    "scripts/experiments/study.py": "runs of ours",
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
     "sim/gym/workers.py": ["pickle"],  # settings and functions of who makes the rooms
