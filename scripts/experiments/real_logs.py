@@ -21,8 +21,8 @@ import numpy as np
 
 from scripts.console import ended
 from scripts.experiments import along_log
-from scripts.experiments.judging import Log, Row, Run, judged
 from scripts.experiments.command import geometric
+from scripts.experiments.judging import Log, Row, Run, judged
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
 from scripts.marks import fill_page, table
