@@ -87,7 +87,6 @@ MARKS: dict[str, tuple[str, ...]] = {
         "slam/shunting/test_reference.py",
         "slam/shunting/test_slam.py::test_a_known_motion",
         "slam/test_jit.py",
-        "slam/test_oracle_map.py::test_in_a_comparison",
         "slam/tracker/belief/test_promises.py",
         "slam/tracker/tracking/test_loops.py",
         "slam/tracker/tracking/test_merging.py::test_round_and_round",
