@@ -142,11 +142,8 @@ def test_who_is_found_stands_right_from_then_on():
     assert judging.found_at(wrong, 12) == 12
     wrong[-1] = True
     assert judging.found(run, judging.found_at(wrong, 7), 7)["found_s"] == math.inf
-    assert judging.large(np.array([[0.6, 0, 0], [0, 0, 0.3], [0.1, 0.1, 0.1]])).tolist() == [
-        1,
-        1,
-        0,
-    ]
+    off = np.array([[0.6, 0.0, 0.0], [0.0, 0.0, 0.3], [0.1, 0.1, 0.1]])
+    assert judging.large(off).tolist() == [True, True, False]
 
 
 def test_nees_is_that_of_its_covariance():
