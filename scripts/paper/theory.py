@@ -26,7 +26,7 @@ from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_steps import thinned
 from slam.shunting.featured import FeaturedShuntingSlam
 from slam.shunting.slam import ShuntingConfig, ShuntingSlam
-from slam.tracker.cells import SIDE, Look
+from slam.tracker.cells import SIDE, Look, living
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
@@ -218,7 +218,7 @@ def _look(network: Network, seen: Observations, pose: Float) -> Look:
 
 def alive(network: Network) -> int:
     """Neurons that are not silent."""
-    slots = network.cells.directory[network.cells.directory >= 0]
+    slots, _ = living(network.cells)
     return int(((network.cells.x[slots] > 0.0) | (network.cells.y[slots] > 0.0)).sum())
 
 
@@ -252,11 +252,8 @@ def _free(frame: Frame, pose: Float) -> Float:
 def inputs_of(network: Network, shape: tuple[int, int], i0: int, j0: int) -> Float:
     """Dense I of the present impressions, neurons (i0 + column, j0 + row)."""
     cells, out = network.cells, np.zeros(shape)
-    for row, column in np.argwhere(cells.directory >= 0).tolist():
-        scratch = int(cells.scratch_of[cells.directory[row, column]])
-        if scratch < 0:
-            continue
-        j = (row + int(cells.corner[1])) * SIDE - j0
-        i = (column + int(cells.corner[0])) * SIDE - i0
-        out[j : j + SIDE, i : i + SIDE] = cells.impression[scratch]
+    for slot, place in zip(*living(cells), strict=True):
+        if (scratch := cells.scratch_of[slot]) >= 0:
+            i, j = place * SIDE - (i0, j0)
+            out[j : j + SIDE, i : i + SIDE] = cells.impression[scratch]
     return out
