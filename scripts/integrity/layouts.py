@@ -62,11 +62,9 @@ class _Plan:
         return [first, second, third, self.node(x0, y1, third, first)]
 
     def done(self) -> Layout:
-        widths = ((self.walls, 4), (self.pillars, 3), (self.rooms, 4), (self.nodes, 2))
-        walls, pillars, rooms, nodes = (
-            np.array(rows, dtype=float).reshape(-1, width) for rows, width in widths
-        )
-        return Layout(walls, pillars, rooms, nodes, np.array(self.edges, dtype=np.int64))
+        widths = {"walls": 4, "pillars": 3, "rooms": 4, "nodes": 2}
+        drawn = {n: np.array(getattr(self, n), float).reshape(-1, w) for n, w in widths.items()}
+        return Layout(**drawn, edges=np.array(self.edges, dtype=np.int64))
 
 
 def _along(rng: np.random.Generator, length: float, depth: float, up: int, down: int) -> Layout:
