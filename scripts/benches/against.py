@@ -151,7 +151,8 @@ def slams(seconds: float) -> Iterator[Row]:
             systems = [create("shunting"), create(name)]
         except MissingDependencyError:
             continue
-        found = in_turn(*(updating(system, iter(blind), part) for system in systems))
+        ours, peer = (updating(system, iter(blind), part) for system in systems)
+        found = in_turn(ours, peer)
         how = f"mean of {part} scans of the office, every effect, 361 beams, all threads"
         yield compared(f"SLAM: {name}", found, 1e3 / part, "ms", how)
 

@@ -33,7 +33,7 @@ class Kind:
     beams, fov_deg, rate_hz  of the scanner; its first and last beam are ``fov_deg`` apart
     sigma_m, range_max_m     noise of a range (m, 1 sigma) and its end
     dropouts                 share of the beams without a return
-    layout, odometry         the ``Building`` and its ``Wheels``; None is by the seed
+    layout, odometry         the ``Building`` and its ``Wheels``; "" is by the seed
     """
 
     chairs: Count = 0
@@ -51,8 +51,8 @@ class Kind:
     sigma_m: float = 0.01
     range_max_m: float = 30.0
     dropouts: Share = 0.0
-    layout: Building | None = None
-    odometry: Wheels | None = None
+    layout: Building | Literal[""] = ""
+    odometry: Wheels | Literal[""] = ""
 
     def __post_init__(self) -> None:
         check(self)

@@ -40,9 +40,9 @@ def reproduce(plan: Plan) -> None:
         report.say("RMSE, medians with quartiles:", quote=True)
         score_table(report, runs)
         report.say(verdict(runs), quote=True)
-    names = ("odometry", "EKF", "shunting", "shunting, paper preset")
+    lines = ("odometry", "EKF", "shunting", "shunting, paper preset")
     for variant, (single, *_) in by_variant.items():
-        errors = {name: single.arrays[f"errors {name}"] for name in names}
+        errors = {name: single.arrays[f"errors {name}"] for name in lines}
         title = f"Chairs, {TITLES[variant]}, single run"
         report.figure(f"fig11-{variant}", fig11(single, title), f"Fig. 11: maps, {TITLES[variant]}")
         figure = pages.error_axes(single.arrays["seconds"], errors, title)

@@ -42,8 +42,8 @@ def fig13(run: Run, name: str) -> Any:
     ax.grid(visible=False)
     # beneath the activities, which cover it only as far as they are high
     ax.plot(*a["raw"].T, ".", color="#1f61be", ms=6.0, mew=0.0, label="raw LIDAR", zorder=1)
-    activities, *where = drawn(run, name)
-    image = draw_activities(ax, activities, *where, "YlOrRd")
+    activities, origin, cell = drawn(run, name)
+    image = draw_activities(ax, activities, origin, cell, "YlOrRd")
     image.set(zorder=2, alpha=np.clip(0.3 + 1.5 * activities.astype(np.float32), 0.0, 1.0))
     ax.plot(*a[f"poses {name}"].T[:2], "k.", ms=2.0, label="trajectory", zorder=4)
     low, high = a["raw"].min(axis=0) - 0.5, a["raw"].max(axis=0) + 0.5

@@ -165,4 +165,4 @@ def test_a_wrong_spec_is_refused():
     ):
         with pytest.raises(InvalidValueError, match=says):
             frames(StreamSpec(**{"kind": "quiet", "seed": 1, **more}))
-    assert {spec.layout for spec in KINDS.values()} == {None, "halfturn", "bare"}
+    assert {spec.layout for spec in KINDS.values()} == {"", "halfturn", "bare"}
