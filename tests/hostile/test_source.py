@@ -8,6 +8,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.fuzz
 REPO = Path(__file__).resolve().parents[2]
 MODULES = {"pickle", "dill", "cloudpickle", "marshal", "shelve", "yaml", "runpy", "code"}
 CALLS = {"eval", "exec", "compile", "__import__", "joblib.load", "joblib.dump", "joblib.Memory",

@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import slam
 from scripts.comparison import entry, folder, make
@@ -16,6 +17,7 @@ from slam.frames import BeamClass, Frame
 from slam.odometry import OdometrySlam
 from slam.replay import Replay
 
+pytestmark = pytest.mark.slow
 PLAN = {"scenes": ("arena",), "levels": (1.0,), "seeds": (7,), "seconds": 1.6}
 SEEN: list[list[Frame]] = []
 

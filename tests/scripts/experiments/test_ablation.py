@@ -3,9 +3,12 @@
 
 import json
 
+import pytest
+
 from scripts.benchmark.tracks import TRACKS
 from scripts.experiments import ablation
 
+pytestmark = pytest.mark.slow
 TRACKS_OF = ("tour-guide-v1", "no-walls-v1")
 
 

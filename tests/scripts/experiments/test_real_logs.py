@@ -15,6 +15,7 @@ from slam import se2
 from slam.errors import LogFormatError
 from tests.world2d import Drive, World2D, laser, rectangle
 
+pytestmark = pytest.mark.slow
 REPO = Path(__file__).resolve().parents[3]
 ROOM = World2D(np.vstack([rectangle(-3.0, -2.0, 5.0, 6.0), rectangle(1.5, 1.0, 2.2, 2.0)]))
 ROUND = Drive((0.0, 0.0, 0.0), ((0.5, 0.25, 2.0 * math.tau * 2.0),))  # one circle of 2 m

@@ -15,6 +15,7 @@ from scripts.integrity.ways import EACH, WAYS, Case, cases
 from slam.errors import InvalidValueError
 from slam.odometry import OdometrySlam
 
+pytestmark = pytest.mark.slow
 WORDS = ["--ways", "chairs", "corridor", "--slams", "odometry", "--losses", "2", "--no-page"]
 
 

@@ -5,9 +5,12 @@ import math
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 from scripts.jobs import _digest, run_jobs
 from scripts.paper.runs import job, load_run, save_run, sign_test, spread, spread_text
+
+pytestmark = pytest.mark.slow
 
 
 def a_run(path: Path, *, seed: int, data: str) -> None:
