@@ -20,6 +20,7 @@ from slam.guests.pipe import Limits
 from slam.replay import Track
 from tests.world2d import World2D, arena, frames, laser, wander
 
+pytestmark = pytest.mark.docs
 REPO = Path(__file__).resolve().parents[1]
 EXAMPLES = REPO / "docs" / "examples"
 PAGE = (REPO / "docs" / "bring_your_own.md").read_text()

@@ -32,6 +32,7 @@ from slam.logs import open as logs
 from slam.logs.bag_topics import Bag
 from slam.names import NameFromFile, load
 
+pytestmark = pytest.mark.docs
 PAGE = (Path(__file__).resolve().parents[1] / "docs" / "extending.md").read_text()
 HEADINGS = {part.partition("\n")[0]: part.partition("\n")[2] for part in PAGE.split("\n## ")[1:]}
 BLOCK = re.compile(r"```(\w+)\n(.*?)```", re.DOTALL)

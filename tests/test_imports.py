@@ -96,3 +96,8 @@ def test_only_the_command_line_imports_verbs():
     for name, found in imports().items():
         if not any(within(name, own) for own in above):
             assert not [word for word in found if within(word, "scripts.verbs")], name
+
+
+def test_no_test_of_slam_imports_what_is_above():
+    for path in (ROOT / "tests" / "slam").rglob("*.py"):
+        assert not [name for name in imported(path) if within(name, "scripts")], path

@@ -8,6 +8,7 @@ import pytest
 
 from tests.processes import python
 
+pytestmark = pytest.mark.docs
 REPO = Path(__file__).resolve().parents[1]
 README = (REPO / "README.md").read_text()
 DOCS = REPO / "docs"

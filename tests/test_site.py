@@ -16,6 +16,7 @@ from scripts.cli import app
 from scripts.site.check import faults, main
 from scripts.site.columns import as_markdown
 
+pytestmark = pytest.mark.docs
 REPO = Path(__file__).resolve().parents[1]
 DOCS = REPO / "docs"
 CONFIG = yaml.safe_load((REPO / "mkdocs.yml").read_text())

@@ -16,6 +16,7 @@ import pytest
 
 from mobilia import PACKAGES
 
+pytestmark = pytest.mark.docs
 REPO = Path(__file__).resolve().parents[1]
 LEFT_OUT = {"__pycache__"}
 

@@ -6,7 +6,7 @@ Small on purpose: it checks a SLAM against known motion, it does not judge fidel
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass, field
+from dataclasses import dataclass, replace
 from typing import Any
 
 import numpy as np
@@ -125,7 +125,6 @@ class Drive:
 
     start: tuple[float, float, float]
     pieces: tuple[tuple[float, float, float], ...]
-    poses: list[Array] = field(default_factory=list)
 
     @property
     def duration(self) -> float:
@@ -308,13 +307,9 @@ def going_on(stream: list[Frame], last: Frame, seconds: float = 0.2) -> list[Fra
     out = []
     for frame in stream:
         stamp = last.stamp_ns + round(seconds * 1e9) + frame.stamp_ns
+        T_odom_robot = se2.compose(last.odometry.T_odom_robot, frame.odometry.T_odom_robot)
+        odometry = replace(frame.odometry, stamp_ns=stamp, T_odom_robot=T_odom_robot)
         assert frame.scan is not None
-        odometry = Odometry(
-            stamp_ns=stamp,
-            T_odom_robot=se2.compose(last.odometry.T_odom_robot, frame.odometry.T_odom_robot),
-            increment_covariance=frame.odometry.increment_covariance,
-            twist=frame.odometry.twist,
-        )
-        scan = Scan(stamp_ns=stamp, ranges=frame.scan.ranges, spec=frame.scan.spec)
-        out.append(Frame(stamp_ns=stamp, odometry=odometry, scan=scan, truth=frame.truth))
+        scan = replace(frame.scan, stamp_ns=stamp)
+        out.append(replace(frame, stamp_ns=stamp, odometry=odometry, scan=scan))
     return out

@@ -22,7 +22,7 @@ import mujoco
 import numpy as np
 
 from scripts import marks, workers
-from scripts.benches.world import DYNAMISM, SEED, note_poses, timed
+from scripts.benches.world import DYNAMISM, SEED, many, scan, timed
 from sim.gym.vector import MobiliaVectorEnv
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
@@ -33,8 +33,8 @@ from sim.simulation import stream
 from sim.world.world import World
 from slam._jit import njit
 from slam.errors import MissingDependencyError
-from slam.frames import LaserSpec
-from slam.system import create
+from slam.frames import Frame, LaserSpec
+from slam.system import SlamSystem, create
 
 PAIRS = 15
 LOW, HIGH = 3, 11  # of the sorted ratios: the median lies between these, 96 %, whatever their law
@@ -77,17 +77,16 @@ def scans(count: int) -> Iterator[Row]:
     """A scan, with the time, label and truth of each beam, against MuJoCo's bare rays."""
     crowded: dict[str, Any] = {"n_chairs": 200}
     for name, options in (("office", {}), ("office, 200 chairs", crowded)):
-        world = World("office", seed=SEED, dynamism=DYNAMISM, **options)
-        laser = LaserScanner(world.model, Lms221Config.ideal(), np.random.default_rng(0))
-
-        def ours(laser: LaserScanner = laser, world: World = world) -> None:
-            for _ in range(count):
-                note_poses(laser.begin(world.data), int(laser.window.marks[1:].sum()))
-                laser.finish()
-
-        found = in_turn(ours, partial(bare_rays, world, laser, count))
+        world, laser = at_rest("office", **options)
+        found = in_turn(many(count, scan, laser, world), bare_rays(world, laser, count))
         how = "361 ideal beams; the peer has one origin, no times, no labels"
         yield compared(f"scan, {name}: `mj_multiRay`", found, 1e6 / count, "µs", how)
+
+
+def at_rest(scene: str, **options: Any) -> tuple[World, LaserScanner]:
+    """A world and an ideal scanner in it."""
+    world = World(scene, seed=SEED, dynamism=DYNAMISM, **options)
+    return world, LaserScanner(world.model, Lms221Config.ideal(), np.random.default_rng(0))
 
 
 def others(count: int) -> Iterator[Row]:
@@ -96,17 +95,10 @@ def others(count: int) -> Iterator[Row]:
         irsim = importlib.import_module("irsim")
     except ImportError:
         return
-    world = World("arena", seed=SEED, dynamism=DYNAMISM)
-    laser = LaserScanner(world.model, Lms221Config.ideal(), np.random.default_rng(0))
+    world, laser = at_rest("arena")
     peer = ir_sim(irsim, world, laser.spec).robot_list[0]
     state = np.array([world.robot_pose()]).T
-
-    def ours() -> None:
-        for _ in range(count):
-            note_poses(laser.begin(world.data), int(laser.window.marks[1:].sum()))
-            laser.finish()
-
-    found = in_turn(ours, lambda: [peer.lidar.step(state) for _ in range(count)])
+    found = in_turn(many(count, scan, laser, world), many(count, peer.lidar.step, state))
     how = "361 ideal beams among the same boxes and discs; the peer has no times, no labels"
     yield compared("scan, arena: ir-sim", found, 1e6 / count, "µs", how)
 
@@ -134,8 +126,8 @@ def ir_sim(irsim: Any, world: World, spec: LaserSpec) -> Any:
         return irsim.make(file.name, display=False, log_level="ERROR")
 
 
-def bare_rays(world: World, laser: LaserScanner, count: int) -> None:
-    """The same rays by MuJoCo, from where the laser is."""
+def bare_rays(world: World, laser: LaserScanner, count: int) -> Callable[[], None]:
+    """Work: the same rays by MuJoCo, from where the laser is."""
     model, data, n = world.model, world.data, laser.spec.n_beams
     groups = np.array([g not in UNSEEN_GROUPS for g in range(6)], dtype=np.uint8)
     at = data.site("robot/laser")
@@ -143,10 +135,10 @@ def bare_rays(world: World, laser: LaserScanner, count: int) -> None:
     rays = np.ascontiguousarray(np.array(local) @ at.xmat.reshape(3, 3).T).ravel()
     geoms, ranges = np.empty(n, dtype=np.int32), np.empty(n)
     own = model.body("robot/base").id
-    for _ in range(count):
-        mujoco.mj_multiRay(
-            model, data, at.xpos, rays, groups, True, own, geoms, ranges, None, n, 80.0
-        )
+    return many(
+        count, mujoco.mj_multiRay,
+        model, data, at.xpos, rays, groups, True, own, geoms, ranges, None, n, 80.0,
+    )  # fmt: skip
 
 
 def slams(seconds: float) -> Iterator[Row]:
@@ -159,31 +151,30 @@ def slams(seconds: float) -> Iterator[Row]:
             systems = [create("shunting"), create(name)]
         except MissingDependencyError:
             continue
-        ahead = [iter(blind), iter(blind)]
-
-        def some(k: int, systems: list[Any] = systems, ahead: list[Any] = ahead) -> None:
-            for _ in range(part):
-                systems[k].update(next(ahead[k]))
-
-        found = in_turn(partial(some, 0), partial(some, 1))
+        ours, peer = (updating(system, iter(blind), part) for system in systems)
+        found = in_turn(ours, peer)
         how = f"mean of {part} scans of the office, every effect, 361 beams, all threads"
         yield compared(f"SLAM: {name}", found, 1e3 / part, "ms", how)
+
+
+def updating(system: SlamSystem, frames: Iterator[Frame], count: int) -> Callable[[], None]:
+    """Work: the next so many scans."""
+    return many(count, lambda: system.update(next(frames)))
 
 
 def at_once(seconds: float) -> Iterator[Row]:
     """What two get done more than one, by the wall: episodes and rooms, and a plain loop beside."""
     how = f"times what one does, by {COPIES}; what else runs on the machine counts"
     loops, steps = ThreadPoolExecutor(COPIES), max(10, round(4 * seconds))
-    many = {
+    sides = {
         n: MobiliaVectorEnv(8, n_workers=n if n > 1 else 0, scene="arena", time_limit_s=1e6)
         for n in (1, COPIES)
     }
-    for rooms in many.values():
+    for rooms in sides.values():
         rooms.reset(seed=SEED)
 
     def stepped(workers: int) -> float:
-        rooms, still = many[workers], np.zeros((8, 2), np.float32)
-        return wall(lambda: [rooms.step(still) for _ in range(workers * steps)])
+        return wall(many(workers * steps, sides[workers].step, np.zeros((8, 2), np.float32)))
 
     def looped(copies: int) -> float:
         return wall(lambda: list(loops.map(loop, [LOOP] * copies)))
@@ -198,7 +189,7 @@ def at_once(seconds: float) -> Iterator[Row]:
         for what, work in (("two workers, 8 rooms", stepped), ("two processes, episodes", made)):
             found = in_turn(work, looped, lambda each: COPIES * each(1) / each(COPIES))
             yield compared(f"{what}: a plain loop", found, 1.0, "×", how)
-    for rooms in many.values():
+    for rooms in sides.values():
         rooms.close()
 
 

@@ -5,6 +5,7 @@ import dataclasses
 import math
 import tempfile
 from collections.abc import Iterator
+from functools import partial
 from pathlib import Path
 from typing import Any
 
@@ -30,7 +31,7 @@ def updates(seconds: float) -> Iterator[Row]:
         ("shunting, 5 cm cells, 181 beams", 1, coarse, _halved(blind), ("aim 0.5", "")),
     ):
         slam = ShuntingSlam(config)
-        spent = [timed(lambda f=f, s=slam: s.update(f)) for f in stream_[::stride]]  # type: ignore[misc]
+        spent = [timed(partial(slam.update, frame)) for frame in stream_[::stride]]
         steady = np.array(spent[5:]) * 1e3
         how = "office, every effect; 361 beams and 3 cm cells unless said otherwise"
         yield row(f"{what}, p50", float(np.percentile(steady, 50)), "ms", targets[0], how)
@@ -38,10 +39,8 @@ def updates(seconds: float) -> Iterator[Row]:
         period_ms = 1e3 * stride / 37.5
         yield row(what, period_ms / float(steady.mean()), "× real time", targets[1], how)
         if stride == 1 and config != coarse:
-            memory = slam.network.bytes_per_neuron()
-            yield row(
-                "network", memory, "B a live neuron", "≤ 40", "office, every array, at the end"
-            )
+            memory, how = slam.network.bytes_per_neuron(), "office, every array, at the end"
+            yield row("network", memory, "B a live neuron", "≤ 40", how)
 
 
 def _halved(frames: list[Any]) -> list[Any]:
@@ -63,7 +62,7 @@ def ekf(seconds: float) -> Iterator[Row]:
         config = PointWorldConfig(n_points=n_points, side_m=side_m, n_steps=n_steps)
         frames = [frame.without_truth() for frame in PointWorld(config, seed=SEED).stream()]
         slam, last = EkfSlam(), min(max(20, round(2 * seconds)), n_steps // 3)
-        spent = [timed(lambda f=f, s=slam: s.update(f)) for f in frames][-last:]  # type: ignore[misc]
+        spent = [timed(partial(slam.update, frame)) for frame in frames][-last:]
         seen = np.mean([len(f.features.points_robot) for f in frames[-last:] if f.features])
         how = f"{seen:.0f} points in view, {len(slam.filter)} landmarks in the end, IPJC"
         for name, percent, target in (("p50", 50, "≤ 10"), ("p90", 90, "")):
@@ -87,7 +86,7 @@ def area(seconds: float) -> Iterator[Row]:
 
 
 def _in_area(slam: Any, frames: list[Any], times: int) -> Row:
-    spent = [timed(lambda f=f: slam.update(f.without_truth())) for f in frames]  # type: ignore[misc]
+    spent = [timed(partial(slam.update, frame.without_truth())) for frame in frames]
     extent = slam.network.extent()
     square_m = (extent[2] - extent[0]) * (extent[3] - extent[1]) * 0.05**2
     how = f"median of 150 scans, arena, 5 cm cells, {times} × the rooms"

@@ -8,6 +8,8 @@ import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
+from functools import partial
+from itertools import islice
 from typing import Any
 
 import gymnasium
@@ -17,7 +19,7 @@ import numpy as np
 import sim  # noqa: F401  (registers the environments)
 from sim.core.packed import packed
 from sim.gym.vector import MobiliaVectorEnv
-from sim.sensors.lidar.device import LaserScanner
+from sim.sensors.lidar.device import LaserScanner, ScanResult
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.windows import note
 from sim.simulation import Simulation, n_frames, tour
@@ -26,7 +28,6 @@ from sim.view.camera import Camera
 from sim.world.substeps import SUBSTEPS_PER_S, unseen
 from sim.world.world import World
 from slam._jit import njit
-from slam.frames import Frame
 
 SEED = 100
 DYNAMISM = 0.5
@@ -49,8 +50,18 @@ def timed(work: Callable[[], object]) -> float:
 
 
 def median(work: Callable[[], object]) -> float:
-    """s, of ``REPEATS`` calls of ``work``."""
-    return float(np.median([timed(work) for _ in range(REPEATS)]))
+    """s, of ``REPEATS`` calls of ``work``, after one that does not count."""
+    return float(np.median([timed(work) for _ in range(REPEATS + 1)][1:]))
+
+
+def many(times: int, call: Callable[..., object], *arguments: Any) -> Callable[[], None]:
+    """Work: the same call so many times."""
+
+    def work() -> None:
+        for _ in range(times):
+            call(*arguments)
+
+    return work
 
 
 def simulation(seconds: float) -> Iterator[Row]:
@@ -59,13 +70,8 @@ def simulation(seconds: float) -> Iterator[Row]:
         room = Simulation(scene, seed=SEED, dynamism=DYNAMISM)
         part = n_frames(seconds / REPEATS, room.scan_period_s)
         frames = tour(room, seconds + 10.0)
-
-        def take(frames: Iterator[Frame] = frames, part: int = part) -> None:
-            for _ in range(part):
-                next(frames)
-
-        take()
-        figure = part * room.scan_period_s / median(take)
+        spent_s = median(lambda frames=frames, part=part: list(islice(frames, part)))  # type: ignore[misc]
+        figure = part * room.scan_period_s / spent_s
         how = f"{scene}: world, actors, scans with every effect, odometry, tour driving"
         yield row(f"simulation, {scene}", figure, "× real time", target, how)
 
@@ -112,14 +118,13 @@ def effects(world: World, scans: int) -> Iterator[Row]:
 def scan_us(world: World, config: Lms221Config, scans: int) -> float:
     """µs of a scan of a world at rest."""
     laser = LaserScanner(world.model, config, np.random.default_rng(0))
+    return median(many(scans, scan, laser, world)) / scans * 1e6
 
-    def many() -> None:
-        for _ in range(scans):
-            note_poses(laser.begin(world.data), int(laser.window.marks[1:].sum()))
-            laser.finish()
 
-    many()
-    return median(many) / scans * 1e6
+def scan(laser: LaserScanner, world: World) -> ScanResult:
+    """One of a world at rest, made as a simulation does."""
+    note_poses(laser.begin(world.data), int(laser.window.marks[1:].sum()))
+    return laser.finish()
 
 
 def physics(seconds: float) -> Iterator[Row]:
@@ -128,18 +133,12 @@ def physics(seconds: float) -> Iterator[Row]:
         ("office", {}, ""),
         ("50 chairs, 10 people", {"n_chairs": 50, "n_people": 10}, "≥ 9000"),
     )
+    scans = max(40, round(seconds / REPEATS * SUBSTEPS_PER_S / 8))
     for name, options, target in cases:
         world = World("office", seed=SEED, dynamism=DYNAMISM, **options)
-        scans = max(40, round(seconds / REPEATS * SUBSTEPS_PER_S / 8))
-        watch = packed(unseen(9))
-
-        def run(world: World = world, scans: int = scans, watch: Any = watch) -> None:
-            for _ in range(scans):
-                world.advance(0, 8, watch)
-
-        run()
+        spent_s = median(many(scans, world.advance, 0, 8, packed(unseen(9))))
         how = "office, 1/300 s each, people and doors in, eight in a call"
-        yield row(f"physics steps, {name}", 8 * scans / median(run), "1/s", target, how)
+        yield row(f"physics steps, {name}", 8 * scans / spent_s, "1/s", target, how)
 
 
 def environments(seconds: float) -> Iterator[Row]:
@@ -150,13 +149,13 @@ def environments(seconds: float) -> Iterator[Row]:
         id_ = f"mobilia/{scene}-v2"
         for name, laser in (("ideal scan", ideal), ("every effect", None)):
             env: Any = gymnasium.make(id_, disable_env_checker=True, time_limit_s=1e6, laser=laser)
-            many = gymnasium.make_vec(
+            vector = gymnasium.make_vec(
                 id_, num_envs=N_ENVS, vectorization_mode="vector_entry_point",
                 time_limit_s=1e6, laser=laser,
             )  # fmt: skip
             for what, room, n, target in (
                 ("single", env.unwrapped, 1, least),
-                (f"vector of {N_ENVS}", many, N_ENVS, 1.5 * least),
+                (f"vector of {N_ENVS}", vector, N_ENVS, 1.5 * least),
             ):
                 room.reset(seed=SEED)
                 figure = n * steps / stepping(room, steps, n)
@@ -165,7 +164,7 @@ def environments(seconds: float) -> Iterator[Row]:
                 yield row(f"env steps, {what}, {name}", figure, "1/s", wanted, how)
         if scene == "Office":
             yield ceiling(env.unwrapped.simulation.world)
-        resets = [timed(lambda env=env, k=k: env.reset(seed=k)) for k in range(9)]  # type: ignore[misc]
+        resets = [timed(partial(env.reset, seed=k)) for k in range(9)]
         wanted = "≤ 50" if scene == "Office" else ""
         how = f"{scene.lower()}, every effect, another seed each time"
         yield row("env reset", float(np.median(resets)) * 1e3, "ms", wanted, how)
@@ -219,19 +218,14 @@ def stepping(room: Any, steps: int, n: int) -> float:
                 action = rng.uniform(-1.0, 1.0, (n, 2)).astype(np.float32)
             room.step(action if n > 1 else action[0])
 
-    run()
     return median(run)
 
 
 def ceiling(world: World) -> Row:
     """What no environment can beat: the eight ``mj_step`` of a scan and nothing else."""
-
-    def run() -> None:
-        for _ in range(800):
-            mujoco.mj_step(world.model, world.data)
-
+    spent_s = median(many(800, mujoco.mj_step, world.model, world.data))
     how = "office: MuJoCo's own 8 steps a scan, no actors, no scan"
-    return row("ceiling of env steps by physics", 100 / median(run), "1/s", "", how)
+    return row("ceiling of env steps by physics", 100 / spent_s, "1/s", "", how)
 
 
 def pictures(seconds: float) -> Iterator[Row]:
@@ -241,7 +235,6 @@ def pictures(seconds: float) -> Iterator[Row]:
     room = Simulation("office", seed=SEED, dynamism=DYNAMISM)
     for shadows, target in ((True, "≤ 110"), (False, "")):
         with Camera(room.world.model, 1280, 720, shadows=shadows) as camera:
-            camera.render(room.world.data)
-            spent = [timed(lambda c=camera: c.render(room.world.data)) for _ in range(10)]  # type: ignore[misc]
+            spent_s = median(partial(camera.render, room.world.data))
         what = "picture 1280 × 720, office, " + ("with shadows" if shadows else "no shadows")
-        yield row(what, float(np.median(spent)) * 1e3, "ms", target, "all threads; software GL")
+        yield row(what, spent_s * 1e3, "ms", target, "all threads; software GL")

@@ -10,6 +10,7 @@ import argparse
 import json
 import sys
 from collections.abc import Sequence
+from copy import copy
 from dataclasses import asdict
 from itertools import pairwise
 from pathlib import Path
@@ -60,8 +61,8 @@ class Samples:
 
     def of(self, which: NDArray[np.bool_]) -> "Samples":
         """Those of them."""
-        other = object.__new__(Samples)
-        other.__dict__.update({name: value[which] for name, value in vars(self).items()})
+        other = copy(self)
+        vars(other).update({name: value[which] for name, value in vars(self).items()})
         return other
 
 

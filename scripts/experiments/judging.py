@@ -15,6 +15,7 @@ from scripts.experiments import along_log, relations, revisits
 from slam import se2
 from slam.evaluation.consistency import KeptScans
 from slam.frames import Float
+from slam.trajectory import read_tum
 
 Row = dict[str, Any]
 HEAD, HEAD_M = 50, 2.0  # scans at the beginning on which a run is laid on its reference, at least
@@ -122,9 +123,8 @@ def nees(online: Float, covariance: Float, reference: Float, sigma_m: float) -> 
 
 def truth_of(path: Path, seconds: Float) -> Float:
     """(n, 3) true poses of a TUM file at those times; NaN outside."""
-    rows = np.array([line.split() for line in relations.lines_of(path)], dtype=np.float64)
-    poses = np.column_stack([rows[:, 1:3], 2.0 * np.arctan2(rows[:, 6], rows[:, 7])])
-    at = relations.by_time(rows[:, 0], poses)
+    truth = read_tum(path)
+    at = relations.by_time(relations.seconds(truth.stamps_ns), truth.poses)
     return np.array([pose if (pose := at(t)) is not None else np.full(3, np.nan) for t in seconds])
 
 

@@ -118,13 +118,9 @@ def clips() -> dict[str, Shot]:
 def crowd(kind: str) -> Shot:
     """Of one of ``_CROWD_SHOTS``."""
     scene, who_is_there, who, at_s, more = _CROWD_SHOTS[kind]
-    settings = {"scene": scene, "crowd": who_is_there, "seed": more.get("seed", 0), "dynamism": 0.0,
+    where = {"far_m": 5.0, "down_deg": 35.0, "seed": 0, **more}
+    settings = {"scene": scene, "crowd": who_is_there, "seed": where.pop("seed"), "dynamism": 0.0,
                 "motion": 0.5, "laser": LASER}  # fmt: skip
-    where = {
-        "far_m": 5.0,
-        "down_deg": 35.0,
-        **{key: value for key, value in more.items() if key != "seed"},
-    }
     return Shot(settings=settings, from_s=at_s, who=who, **where)
 
 
@@ -160,8 +156,7 @@ def scene_picture(name: str) -> Image.Image:
     scene.place(model, data)
     mujoco.mj_forward(model, data)
     with Camera(model, *_large(SCENE_PX), samples=4) as camera:
-        large = camera.render(data, "persp")
-    return Image.fromarray(large).resize(SCENE_PX, Image.Resampling.LANCZOS)
+        return _small(camera.render(data, "persp"), SCENE_PX)
 
 
 def crowd_picture() -> Image.Image:
@@ -169,7 +164,7 @@ def crowd_picture() -> Image.Image:
     cells = []
     for kind in _CROWD_SHOTS:
         large = next(pictures(crowd(kind), _large(CROWD_PX), 1))
-        one = np.array(Image.fromarray(large).resize(CROWD_PX, Image.Resampling.LANCZOS))
+        one = np.array(_small(large, CROWD_PX))
         one[-BAND_PX:] = (0.25 * one[-BAND_PX:] + 0.75 * 250.0).astype(np.uint8)
         place, font = (6, CROWD_PX[1] - 6), cv2.FONT_HERSHEY_SIMPLEX
         cv2.putText(one, kind, place, font, 0.45, (40, 44, 54), 1, cv2.LINE_AA)
@@ -180,6 +175,10 @@ def crowd_picture() -> Image.Image:
 
 def _large(size: tuple[int, int]) -> tuple[int, int]:
     return OVERSAMPLING * size[0], OVERSAMPLING * size[1]
+
+
+def _small(picture: Picture, size: tuple[int, int]) -> Image.Image:
+    return Image.fromarray(picture).resize(size, Image.Resampling.LANCZOS)
 
 
 def save(picture: Image.Image, path: Path) -> Path:

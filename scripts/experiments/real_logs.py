@@ -13,6 +13,7 @@ import lzma
 import subprocess
 import sys
 from collections.abc import Callable, Mapping, Sequence
+from contextlib import suppress
 from itertools import product
 from pathlib import Path
 from statistics import fmean
@@ -21,8 +22,8 @@ import numpy as np
 
 from scripts.console import ended
 from scripts.experiments import along_log
+from scripts.experiments.command import geometric
 from scripts.experiments.judging import Log, Row, Run, judged
-from scripts.experiments.study import geometric
 from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
 from scripts.marks import fill_page, table
@@ -99,16 +100,14 @@ def commit_of(code: Path) -> str:
     """Its short hash, and + where files of ``slam`` are others; raises ``InvalidValueError``."""
 
     def git(*words: str) -> str:
-        done = subprocess.run(
-            ["git", *words], cwd=code, capture_output=True, text=True, check=False
-        )
-        if done.returncode:
-            raise InvalidValueError(f"--code must be a checkout of this project, got {code}")
+        done = subprocess.run(["git", *words], cwd=code, capture_output=True, text=True, check=True)
         return done.stdout.strip()
 
-    if not (code / "slam").is_dir():
-        raise InvalidValueError(f"--code must be a checkout of this project, got {code}")
-    return git("rev-parse", "--short=8", "HEAD") + "+" * bool(git("status", "--short", "slam"))
+    if (code / "slam").is_dir():
+        with suppress(OSError, subprocess.CalledProcessError):
+            changed = git("status", "--short", "slam")
+            return git("rev-parse", "--short=8", "HEAD") + "+" * bool(changed)
+    raise InvalidValueError(f"--code must be a checkout of this project, got {code}")
 
 
 def cases(wanted: argparse.Namespace) -> list[tuple[Row, Job]]:
@@ -121,9 +120,11 @@ def cases(wanted: argparse.Namespace) -> list[tuple[Row, Job]]:
         words = ["--slam", slam, "--config", json.dumps(wanted.config)]
         words += ["--laser", json.dumps(log.laser)] if log.laser else []
         words += ["--scan", log.scan] if log.scan else []
-        words += ["--every", str(wanted.every)] if wanted.every != 1 else []
-        words += ["--backwards"] if wanted.backwards else []
-        way = "".join(f", {word}" for word in way_of(wanted))
+        way = ""
+        if wanted.every != 1:
+            words, way = [*words, "--every", str(wanted.every)], f", every {wanted.every}"
+        if wanted.backwards:
+            words, way = [*words, "--backwards"], f"{way}, backwards"
         told = slam + (json.dumps(wanted.config) if wanted.config else "")
         job = Job(
             name=file_name(f"{name}{way}_{commit}_{told}")[:150],
@@ -135,22 +136,24 @@ def cases(wanted: argparse.Namespace) -> list[tuple[Row, Job]]:
     return found
 
 
-def way_of(wanted: argparse.Namespace) -> list[str]:
-    """How else than whole and forwards a log is taken."""
-    every = [f"every {wanted.every}"] if wanted.every != 1 else []
-    return [*every, *["backwards"] * wanted.backwards]
-
-
 def kept(path: Path, rows: Sequence[Row]) -> list[Row]:
     """The rows of the table at ``path`` that are none of these, and these: by log, as listed."""
     old: list[Row] = []
     if path.exists():
         with path.open(newline="", encoding="utf-8") as file:
             old = [{key: row.get(key, "") for key in COLUMNS} for row in csv.DictReader(file)]
-    new = [{key: told(key, row) for key in COLUMNS} for row in rows]
+    new = [cells_of(row) for row in rows]
     every = {tuple(row[key] for key in KEYS): row for row in (*old, *new)}
     order = list(LOGS)
     return sorted(every.values(), key=lambda row: order.index(row["log"].partition(",")[0]))
+
+
+def cells_of(row: Row) -> dict[str, str]:
+    """Each column as it is written; "" for what cannot be said of that log."""
+    return {
+        key: "" if (value := row.get(key)) is None else format(value, form)
+        for key, form in COLUMNS.items()
+    }
 
 
 def as_csv(rows: Sequence[Row]) -> str:
@@ -158,12 +161,6 @@ def as_csv(rows: Sequence[Row]) -> str:
     text = io.StringIO()
     csv.writer(text, lineterminator="\n").writerows([list(COLUMNS), *(r.values() for r in rows)])
     return text.getvalue()
-
-
-def told(column: str, row: Row) -> str:
-    """A cell; "" for what cannot be said of that log."""
-    value = row.get(column)
-    return "" if value is None else format(value, COLUMNS[column])
 
 
 def summary(rows: Sequence[Row]) -> str:
@@ -209,7 +206,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
         log = LOGS[keys["log"].partition(",")[0]]
         rows.append(keys | judged(run, log, wanted.data, given))
         write_text(wanted.out / CSV, as_csv(kept(wanted.out / CSV, rows)))
-    print(table(list(COLUMNS), [[told(key, row) for key in COLUMNS] for row in rows], left=3))
+    print(table(list(COLUMNS), [list(cells_of(row).values()) for row in rows], left=3))
     on = f"Measured on: {machine()['processor']}, {machine()['cores']} cores."
     print(f"\n{on}")
     if wanted.page:

@@ -14,27 +14,28 @@ import argparse
 import json
 import math
 import sys
-from collections.abc import Callable, Mapping, Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import asdict
 from pathlib import Path
 from typing import Any
 
+import slam
 from scripts.console import ended
-from scripts.experiments.study import add_run_options, head
+from scripts.experiments.command import add_run_options, head
+from scripts.imports import code_of
 from scripts.integrity import losses
-from scripts.integrity.counting import ALERT_M, bin_quantile, most_of_time, most_of_trials, pooled
+from scripts.integrity.counting import ALERT_M, bin_quantile, most_of_time, most_of_trials
 from scripts.integrity.ways import WAYS, Case, cases
 from scripts.jobs import Job, run_jobs
 from scripts.marks import fill_page, table
 from scripts.names import file_name
 from scripts.options import whole
 from scripts.output import configs_of
-from scripts.result_files import ROOT, write
+from scripts.result_files import write
 from slam.errors import InvalidValueError
 from slam.evaluation.statistics import quantile
 
 Row = Mapping[str, Any]
-Column = Callable[[Row], str]
 ALL = "all"
 CM, PERCENT, S_PER_HOUR = 100.0, 100.0, 3600.0
 
@@ -62,7 +63,7 @@ def summary(cases: Sequence[Row]) -> dict[str, Any]:
     silent = sum((drive["silent"] or 0.0) * drive["scans"] for drive in drives)
     se2 = [drive["se2"] for drive in drives]
     spent = [one for case in cases for one in (case["drive"], *case["losses"]) if "ms" in one]
-    bins = pooled([one["ms"] for one in spent])
+    bins = [one["ms"] for one in spent]
     return {
         "cases": len(cases),
         "failed": sum(bool(case["failed"]) for case in cases),
@@ -87,7 +88,7 @@ def summary(cases: Sequence[Row]) -> dict[str, Any]:
         "se2_p95": quantile(se2, 0.95),
         "ate": quantile([drive["ate"] for drive in drives], 0.5),
         "silent": _share(silent, driven),
-        "timed": sum(bins.values()),
+        "timed": sum(sum(one.values()) for one in bins),
         "p50_ms": bin_quantile(bins, 0.5),
         "p99_ms": bin_quantile(bins, 0.99),
         "p999_ms": bin_quantile(bins, 0.999),
@@ -103,62 +104,60 @@ def _share(count: float, of: float) -> float:
     return count / of if of > 0 else math.nan
 
 
-def _told(value: float, digits: int = 2) -> str:
-    """A number of a cell; a dash for none, "never" for what lasts."""
+def _with_share(row: Row) -> Row:
+    return {**row, "share": _share(row["hazardous"], row["losses"])}
+
+
+def _told(value: float, digits: int | None) -> str:
+    """A number of a cell, or a count; a dash for none, "never" for what lasts."""
+    if digits is None:
+        return str(value)
     if math.isnan(value):
         return "–"
     return "never" if math.isinf(value) else f"{value:.{digits}f}"
 
 
-def _number(key: str, digits: int, times: float = 1.0) -> Column:
-    return lambda row: _told(times * row[key], digits)
+def cell(row: Row, names: str, digits: int | None = None, times: float = 1.0) -> str:
+    """So many ``times`` a number of a ``summary``; of "number ≤ most" with its upper bound."""
+    number, *most = (
+        _told(row[name] if digits is None else times * row[name], digits)
+        for name in names.split(" ≤ ")
+    )
+    return number + "".join(f" (≤ {bound})" for bound in most)
 
 
-def _count(key: str) -> Column:
-    return lambda row: str(row[key])
-
-
-def _hazardous_share(row: Row) -> str:
-    share = _share(row["hazardous"], row["losses"])
-    return f"{_told(PERCENT * share)} (≤ {_told(PERCENT * row['most'])})"
-
-
-def _moments_an_hour(row: Row) -> str:
-    return f"{_told(row['moments_per_hour'])} (≤ {_told(row['moments_per_hour_most'])})"
-
-
-TABLES: tuple[Mapping[str, Column], ...] = (
+TABLES: tuple[Mapping[str, tuple[Any, ...]], ...] = (
     {
-        "losses": _count("losses"),
-        "hazardous": _count("hazardous"),
-        "of losses, %": _hazardous_share,
-        "scans, %": _number("hazardous_scans", 3, PERCENT),
-        "denied, %": _number("denied", 3, PERCENT),
-        "misleading, %": _number("misleading", 3, PERCENT),
-        "unavailable, %": _number("unavailable", 2, PERCENT),
-        "hazardous, 3 σ ≤ 0.5 m": _count("hazardous_protected"),
-        "such scans, %": _number("protected", 2, PERCENT),
-        "wrong places": _count("wrong_places"),
-        "hours": _number("hours", 2),
-        "moments an hour": _moments_an_hour,
+        "losses": ("losses",),
+        "hazardous": ("hazardous",),
+        "of losses, %": ("share ≤ most", 2, PERCENT),
+        "scans, %": ("hazardous_scans", 3, PERCENT),
+        "denied, %": ("denied", 3, PERCENT),
+        "misleading, %": ("misleading", 3, PERCENT),
+        "unavailable, %": ("unavailable", 2, PERCENT),
+        "hazardous, 3 σ ≤ 0.5 m": ("hazardous_protected",),
+        "such scans, %": ("protected", 2, PERCENT),
+        "wrong places": ("wrong_places",),
+        "hours": ("hours", 2),
+        "moments an hour": ("moments_per_hour ≤ moments_per_hour_most", 2),
     },
     {
-        "to recover": _count("to_recover"),
-        "not": _count("not_recovered"),
-        "median, s": _number("recover_s", 2),
-        "p90, s": _number("recover_p90_s", 2),
-        "worst, s": _number("recover_worst_s", 2),
-        "SE(2), cm": _number("se2", 2, CM),
-        "p95, cm": _number("se2_p95", 2, CM),
-        "unaligned, cm": _number("ate", 2, CM),
-        "silent, %": _number("silent", 3, PERCENT),
+        "to recover": ("to_recover",),
+        "not": ("not_recovered",),
+        "median, s": ("recover_s", 2),
+        "p90, s": ("recover_p90_s", 2),
+        "worst, s": ("recover_worst_s", 2),
+        "SE(2), cm": ("se2", 2, CM),
+        "p95, cm": ("se2_p95", 2, CM),
+        "unaligned, cm": ("ate", 2, CM),
+        "silent, %": ("silent", 3, PERCENT),
     },
     {
-        "scans": _count("timed"),
-        "p50, ms": _number("p50_ms", 1),
-        "p99, ms": _number("p99_ms", 1),
-        "p99.9, ms": _number("p999_ms", 1),
-        "longest, ms": _number("longest_ms", 1),
+        "scans": ("timed",),
+        "p50, ms": ("p50_ms", 1),
+        "p99, ms": ("p99_ms", 1),
+        "p99.9, ms": ("p999_ms", 1),
+        "longest, ms": ("longest_ms", 1),
     },
 )
 """Integrity, recovery and errors, times: each column by its heading."""
@@ -166,30 +165,18 @@ TABLES: tuple[Mapping[str, Column], ...] = (
 
 def markdown(rows: Mapping[tuple[str, str], Row]) -> str:
     """The tables of each SLAM. Keys: SLAM and way."""
-    parts = []
-    for slam in dict.fromkeys(slam for slam, _ in rows):
-        own = {way: row for (name, way), row in rows.items() if name == slam}
-        parts.append(f"`{slam}`, hazardous beyond {ALERT_M:g} m:")
+    parts: list[str] = []
+    for name in dict.fromkeys(name for name, _ in rows):
+        parts.append(f"`{name}`, hazardous beyond {ALERT_M:g} m:")
+        own = [(way, _with_share(row)) for (of, way), row in rows.items() if of == name]
         for columns in TABLES:
-            cells = [[way, *(cell(row) for cell in columns.values())] for way, row in own.items()]
-            parts.append(table(("way", *columns), cells))
+            lines = ([way, *(cell(row, *of) for of in columns.values())] for way, row in own)
+            parts.append(table(("way", *columns), lines))
     return "\n\n".join(parts)
 
 
 PAGE, MARK = Path("docs/integrity.md"), "campaign"
 LOGS = (".log", ".clf", ".log.gz", ".log.xz")
-PLANE = tuple(
-    ROOT / "scripts" / "integrity" / f"{name}.py"
-    for name in ("driving", "geometry", "kinds", "layouts", "movers", "plane", "things")
-)
-CODE = (
-    ROOT / "slam", *PLANE, ROOT / "scripts" / "metrics",
-    *(
-        ROOT / "scripts" / "integrity" / f"{name}.py"
-        for name in ("counting", "kidnap", "losses", "ways")
-    ),
-)  # fmt: skip
-"""What a case depends on."""
 
 
 def logs_in(places: Sequence[Path]) -> list[Path]:
@@ -211,7 +198,7 @@ def job(case: Case) -> Job:
         call=losses.settle,
         arguments={"case": asdict(case), "config": configs_of([case.slam])},
         suffix=".json",
-        code=(*CODE, *([Path(case.log)] if case.log else [])),
+        code=(*code_of(losses.settle, slam), *([Path(case.log)] if case.log else [])),
     )
 
 

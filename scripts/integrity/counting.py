@@ -23,7 +23,6 @@ from numpy.typing import NDArray
 
 from scripts.integrity.kidnap import RIGHT_M, RIGHT_RAD
 from scripts.metrics.judged import SILENT_M, Judged
-from slam.errors import InvalidValueError
 from slam.evaluation.statistics import CONFIDENCE
 from slam.frames import NS_PER_S, Float
 
@@ -132,15 +131,12 @@ def stretches(mask: Mask) -> int:
 
 def most_of_trials(hits: int, n: int) -> float:
     """Exact upper bound of a share at ``CONFIDENCE``, one-sided (Clopper-Pearson); nearly 3 / n of
-    none. NaN of no trials; ``InvalidValueError`` for more hits than trials.
+    none. NaN of no trials; ``ValueError`` for more hits than trials.
     """
-    if not 0 <= hits <= n:
-        raise InvalidValueError(f"hits must be 0 to {n}, got {hits}")
     if n == 0:
         return math.nan
-    if hits == n:
-        return 1.0
-    return float(scipy.stats.beta.ppf(CONFIDENCE, hits + 1, n - hits))
+    test = scipy.stats.binomtest(hits, n, alternative="less")
+    return float(test.proportion_ci(CONFIDENCE, method="exact").high)
 
 
 def most_of_time(events: int, hours: float) -> float:
@@ -156,19 +152,15 @@ def binned(milliseconds: Sequence[float] | Float) -> dict[str, int]:
     return {str(at): count for at, count in sorted(Counter(where.tolist()).items())}
 
 
-def pooled(bins: Sequence[Mapping[str, int]]) -> Counter[int]:
-    """The sum of several."""
-    out: Counter[int] = Counter()
-    for one in bins:
-        out.update({int(at): count for at, count in one.items()})
-    return out
+def bin_quantile(bins: Sequence[Mapping[str, int]], share: float) -> float:
+    """The middle of the first bin up to which ``share`` of all of ``binned`` lie, ms; NaN of none.
 
-
-def bin_quantile(bins: Mapping[int, int], share: float) -> float:
-    """The middle of the first bin up to which ``share`` of all lie, ms; NaN of nothing."""
-    wanted, seen = share * sum(bins.values()), 0
-    for at in sorted(bins):
-        seen += bins[at]
+    bins  several of ``binned``, which count together
+    """
+    counts = sum(map(Counter, bins), Counter[str]())
+    wanted, seen = share * counts.total(), 0
+    for at in sorted(counts, key=int):
+        seen += counts[at]
         if seen >= wanted:
-            return float(2.0 ** (at / PER_OCTAVE))
+            return float(2.0 ** (int(at) / PER_OCTAVE))
     return math.nan

@@ -5,6 +5,8 @@ import math
 
 import numpy as np
 from numpy.typing import NDArray
+from scipy.sparse import csr_array
+from scipy.sparse.csgraph import breadth_first_order
 
 from scripts.integrity.layouts import Layout
 from slam import se2
@@ -22,37 +24,22 @@ BIASED = (0.98, 1.04)  # of the "biased" model: gain of the way and of the headi
 
 def tour(layout: Layout, count: int, rng: np.random.Generator) -> NDArray[np.int64]:
     """(count,) nodes: from a drawn one by the fewest edges to one visited least, and on."""
-    near: list[list[int]] = [[] for _ in layout.nodes]
-    for i, j in layout.edges.tolist():
-        near[i].append(j)
-        near[j].append(i)
-    visits = np.zeros(len(layout.nodes))
-    out = [int(rng.integers(len(layout.nodes)))]
+    n = len(layout.nodes)
+    start, end = np.stack([layout.edges, layout.edges[:, ::-1]], axis=1).reshape(-1, 2).T
+    order = np.argsort(start, kind="stable")
+    first = np.searchsorted(start[order], np.arange(n + 1))
+    graph = csr_array((np.ones(len(end)), end[order], first), shape=(n, n))
+    visits, out = np.zeros(n), [int(rng.integers(n))]
     while len(out) < count:
         visits[out[-1]] += 1.0
-        costs = visits + rng.uniform(0.0, 0.9, len(visits))
+        costs = visits + rng.uniform(0.0, 0.9, n)
         costs[out[-1]] = np.inf
-        for node in _way(near, out[-1], int(np.argmin(costs))):
-            out.append(node)
-            visits[node] += 1.0
+        goal = int(np.argmin(costs))
+        towards = breadth_first_order(graph, goal)[1]
+        while out[-1] != goal:
+            out.append(int(towards[out[-1]]))
+            visits[out[-1]] += 1.0
     return np.array(out[:count], dtype=np.int64)
-
-
-def _way(near: list[list[int]], start: int, end: int) -> list[int]:
-    """The nodes after ``start`` of a way of the fewest edges to ``end``."""
-    before = {end: end}
-    front = [end]
-    while start not in before:
-        front = [
-            other
-            for node in front
-            for other in near[node]
-            if before.setdefault(other, node) == node and other != end
-        ]
-    out = [before[start]]
-    while out[-1] != end:
-        out.append(before[out[-1]])
-    return out
 
 
 @njit

@@ -9,6 +9,7 @@ nothing of it.
 import math
 from collections.abc import Iterator
 from dataclasses import replace
+from itertools import islice
 
 import numpy as np
 
@@ -36,21 +37,20 @@ def push(kind: str, rng: np.random.Generator) -> Float:
 def targets(mapped: list[Frame], later: list[Frame], scans: int, count: int) -> Iterator[int]:
     """Moments of ``later`` to be put to."""
     tour = np.array([frame.truth for frame in mapped])
-    end = tour[-1]
-    rng = np.random.default_rng(len(later))
-    found = 0
-    for k in rng.permutation(np.arange(1, len(later) - scans)).tolist():
+
+    def fits(k: int) -> bool:
+        """Far from the end of the tour, and near a place of it."""
         place = later[k].truth
         assert place is not None
-        jump = place - end
+        jump = place - tour[-1]
         far = math.hypot(jump[0], jump[1]) >= FAR_M or abs(se2.wrap(float(jump[2]))) >= FAR_RAD
         near = ((tour[:, :2] - place[:2]) ** 2).sum(axis=1) < KNOWN_M**2
-        known = near & (np.abs(se2.wrap_array(tour[:, 2] - place[2])) < KNOWN_RAD)
-        if far and known.any():
-            yield k
-            found += 1
-            if found == count:
-                return
+        return far and bool(
+            (near & (np.abs(se2.wrap_array(tour[:, 2] - place[2])) < KNOWN_RAD)).any()
+        )
+
+    drawn = np.random.default_rng(len(later)).permutation(np.arange(1, len(later) - scans))
+    return islice(filter(fits, drawn.tolist()), count)
 
 
 def kidnapped(mapped: list[Frame], later: list[Frame], start: int, scans: int) -> Iterator[Frame]:

@@ -2,22 +2,21 @@
 """What moves in a stream of the plane, and what the robot has to see it with: a table of kinds."""
 
 import math
-from dataclasses import dataclass, field, fields, replace
+from dataclasses import dataclass, fields, replace
+from typing import Annotated, Literal, get_args
 
 import numpy as np
+from msgspec import Meta
 
-from slam.errors import InvalidValueError, UnknownNameError
+from slam.shaped import check, one_of
 
-LAYOUTS = ("flat", "halfturn", "corridor", "hall", "office")
-ODOMETRIES = ("fifth", "biased", "stated", "good")
+Building = Literal["flat", "halfturn", "corridor", "hall", "office", "bare"]
+Wheels = Literal["fifth", "biased", "stated", "good"]
+LAYOUTS, ODOMETRIES = get_args(Building)[:-1], get_args(Wheels)  # in turn, by the seed
 PARTS = ("layout", "chairs", "boards", "people", "odometry", "lidar", "driving")
-MOST_SECONDS = 3600.0
-LIMITS = {
-    "chairs": (0, 200), "boards": (0, 200), "people": (0, 200), "beams": (2, 4000),
-    "fov_deg": (1.0, 360.0), "rate_hz": (0.1, 100.0), "moved_every_s": (1.0, math.inf),
-    "dropouts": (0.0, 1.0), "escort": (0.0, 1.0), "hug": (0.0, 1.0),
-}  # fmt: skip
-NAMED = {"layout": (*LAYOUTS, "bare"), "odometry": ODOMETRIES}
+Count = Annotated[int, Meta(ge=0, le=200)]
+Share = Annotated[float, Meta(ge=0.0, le=1.0)]
+Whole = Annotated[int, Meta(ge=0)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -34,36 +33,29 @@ class Kind:
     beams, fov_deg, rate_hz  of the scanner; its first and last beam are ``fov_deg`` apart
     sigma_m, range_max_m     noise of a range (m, 1 sigma) and its end
     dropouts                 share of the beams without a return
-    layout, odometry         one of ``LAYOUTS`` (or "bare") and ``ODOMETRIES``; "" is by the seed
+    layout, odometry         the ``Building`` and its ``Wheels``; "" is by the seed
     """
 
-    chairs: int = 0
-    boards: int = 0
-    people: int = 0
+    chairs: Count = 0
+    boards: Count = 0
+    people: Count = 0
     chair_rest_s: float = 8.0
     board_rest_s: float = 4.0
     board_m: tuple[float, float] = (1.2, 2.0)
-    escort: float = 0.0
-    hug: float = 0.6
-    moved_every_s: float = math.inf
-    beams: int = 181
-    fov_deg: float = 180.0
-    rate_hz: float = 10.0
+    escort: Share = 0.0
+    hug: Share = 0.6
+    moved_every_s: Annotated[float, Meta(ge=1.0)] = math.inf
+    beams: Annotated[int, Meta(ge=2, le=4000)] = 181
+    fov_deg: Annotated[float, Meta(ge=1.0, le=360.0)] = 180.0
+    rate_hz: Annotated[float, Meta(ge=0.1, le=100.0)] = 10.0
     sigma_m: float = 0.01
     range_max_m: float = 30.0
-    dropouts: float = 0.0
-    layout: str = ""
-    odometry: str = ""
+    dropouts: Share = 0.0
+    layout: Building | Literal[""] = ""
+    odometry: Wheels | Literal[""] = ""
 
     def __post_init__(self) -> None:
-        for name, (low, high) in LIMITS.items():
-            if not low <= getattr(self, name) <= high:
-                given = getattr(self, name)
-                raise InvalidValueError(f"Kind.{name} must be {low:g} to {high:g}, got {given}")
-        for name, known in NAMED.items():
-            if getattr(self, name) not in ("", *known):
-                given = getattr(self, name)
-                raise UnknownNameError(f"{name} must be one of {', '.join(known)}, got {given!r}")
+        check(self)
 
 
 KINDS = {
@@ -100,30 +92,20 @@ class StreamSpec:
     seconds  simulated
     changes  pairs of a field of ``Kind`` and its value
 
-    Raises ``UnknownNameError`` for a kind that is none, ``InvalidValueError`` for other values.
+    Raises ``InvalidValueError`` for a kind or a field that is none, and for other values.
     """
 
     kind: str
-    seed: int
-    again: int = 0
-    seconds: float = 150.0
-    changes: tuple[tuple[str, float | int | str], ...] = field(default=())
+    seed: Whole
+    again: Whole = 0
+    seconds: Annotated[float, Meta(ge=1.0, le=3600.0)] = 150.0
+    changes: tuple[tuple[str, float | str], ...] = ()
 
     def __post_init__(self) -> None:
-        if self.kind not in KINDS:
-            raise UnknownNameError(f"kind must be one of {', '.join(KINDS)}, got {self.kind!r}")
-        if not 1.0 <= self.seconds <= MOST_SECONDS:
-            raise InvalidValueError(
-                f"StreamSpec.seconds must be 1 to {MOST_SECONDS:g}, got {self.seconds}"
-            )
-        if self.seed < 0 or self.again < 0:
-            raise InvalidValueError(
-                f"StreamSpec.seed and again must be >= 0, got {self.seed} and {self.again}"
-            )
-        known = {one.name for one in fields(Kind)}
+        one_of("kind", self.kind, KINDS)
+        check(self)
         for name, _ in self.changes:
-            if name not in known:
-                raise UnknownNameError(f"Kind has no field {name!r}: {', '.join(sorted(known))}")
+            one_of("changes", name, [one.name for one in fields(Kind)])
 
     @property
     def settings(self) -> Kind:

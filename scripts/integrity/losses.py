@@ -10,17 +10,8 @@ from typing import Any
 
 import numpy as np
 
+from scripts.integrity import kidnap
 from scripts.integrity.counting import Moments, binned, stretches
-from scripts.integrity.kidnap import (
-    AFTER_S,
-    BACK_DEG,
-    BACK_M,
-    KINDS,
-    kidnapped,
-    push,
-    scans_after,
-    targets,
-)  # fmt: skip
 from scripts.integrity.plane import frames
 from scripts.integrity.ways import EACH, WAYS, Case
 from scripts.metrics.judged import Judged, world_truth
@@ -100,9 +91,9 @@ def _in_log(tally: Tally, case: Case, system: SlamSystem) -> None:
 
 def _kidnap(tally: Tally, track: Track, mapped: list[Frame], later: list[Frame]) -> None:
     """``EACH`` losses after ``mapped``, to the poses of ``later``."""
-    scans = scans_after(mapped)
-    for start in targets(mapped, later, scans, EACH):
-        after = list(kidnapped(mapped, later, start, scans))
+    scans = kidnap.scans_after(mapped)
+    for start in kidnap.targets(mapped, later, scans, EACH):
+        after = list(kidnap.kidnapped(mapped, later, start, scans))
         moved = se2.between(_truth(mapped[-1]), _truth(after[0]))
         then = _followed(track, len(mapped), after, np.zeros(3))
         run_ = _moments(then, [*mapped, *after]).since(len(mapped))
@@ -124,10 +115,10 @@ def _pushed(tally: Tally, case: Case, system: SlamSystem) -> None:
             kept[k] = copy.deepcopy(track)
         _survived(track, [frame])
     tally.drive, run_ = _drive(track, stream)
-    right, scans = run_.right(), round(AFTER_S * case.spec.settings.rate_hz)
+    right, scans = run_.right(), round(kidnap.AFTER_S * case.spec.settings.rate_hz)
     for k, before in kept.items():
-        kind = KINDS[moments[k] % len(KINDS)]
-        by, end = push(kind, rng), k + scans
+        kind = kidnap.KINDS[moments[k] % len(kidnap.KINDS)]
+        by, end = kidnap.push(kind, rng), k + scans
         then = _followed(before, k, stream[k:end], by)
         if right[k - 1]:
             unpushed = [
@@ -135,7 +126,7 @@ def _pushed(tally: Tally, case: Case, system: SlamSystem) -> None:
                 for frame, estimate in zip(stream[:end], track.estimates, strict=False)
             ]
             run_, beside = (_moments(then, truth).since(k) for truth in (stream[:end], unpushed))
-            loss = _event(run_, beside, BACK_M, math.radians(BACK_DEG))
+            loss = _event(run_, beside, kidnap.BACK_M, math.radians(kidnap.BACK_DEG))
             tally.losses.append({"event": f"push {kind}"} | loss | _spent(then, k))
 
 

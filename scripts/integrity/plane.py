@@ -15,22 +15,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
+from scripts.integrity import things
 from scripts.integrity.driving import driven, odometry
 from scripts.integrity.geometry import first_hits
 from scripts.integrity.kinds import KINDS, StreamSpec
 from scripts.integrity.layouts import Layout, layout
 from scripts.integrity.movers import live, may_stand
-from scripts.integrity.things import (
-    AROUND_M,
-    BOX,
-    DISCS,
-    LEGS,
-    SIDES,
-    Plane,
-    Things,
-    outlines,
-    traits,
-)
+from scripts.integrity.things import AROUND_M, BOX, DISCS, LEGS, SIDES, Plane, Things
 from slam.frames import BeamClass, BeamLabels, Float, Frame, LaserSpec, Odometry, Scan, to_ns
 
 __all__ = ["KINDS", "StreamSpec", "World", "frames", "world"]
@@ -66,7 +57,7 @@ def world(spec: StreamSpec) -> World:
     path = driven(building, scans * every * dt, dt, spec.rng("driving"))[: scans * every]
     rngs = {part: spec.rng(part) for part in ("chairs", "boards", "people")}
     plane = Plane(
-        traits(kind, rngs["chairs"], rngs["boards"]), building.rooms, building.walls,
+        things.traits(kind, rngs["chairs"], rngs["boards"]), building.rooms, building.walls,
         building.pillars, path, dt, math.radians(kind.fov_deg),
     )  # fmt: skip
     _place(plane, rngs)
@@ -147,7 +138,7 @@ def _looked(known: World, laser: LaserSpec) -> tuple[Float, Float]:
     ranges = np.zeros((len(known.robot), laser.n_beams))
     hits = np.zeros_like(ranges)
     for k, pose in enumerate(known.robot):
-        outlines(known.poses[k], known.things, segments, discs)
+        things.outlines(known.poses[k], known.things, segments, discs)
         first_hits(pose, laser.angles, segments, discs, ranges[k], hits[k])
     return ranges, hits
 

@@ -73,12 +73,11 @@ def traits(kind: Kind, chairs: np.random.Generator, boards: np.random.Generator)
 
 def _chairs(kind: Kind, rng: np.random.Generator) -> Iterator[dict[str, float]]:
     for k in range(kind.chairs):
-        rest = {"slow": 0.1, "fast": 0.5, "rest_s": kind.chair_rest_s, "rests": 0.6}
-        if k % 3 == 0:
-            yield {"kind": CHAIR, "radius": 0.3, **rest}
-        else:
+        chair = {"kind": CHAIR, "radius": 0.3}
+        if k % 3:
             half, radius = float(rng.uniform(0.0, 0.2)), float(rng.uniform(0.2, 0.3))
-            yield {"kind": BOX, "half": half, "radius": radius, **rest}
+            chair = {"kind": BOX, "half": half, "radius": radius}
+        yield {**chair, "slow": 0.1, "fast": 0.5, "rest_s": kind.chair_rest_s, "rests": 0.6}
 
 
 def _boards(kind: Kind, rng: np.random.Generator) -> Iterator[dict[str, float]]:
@@ -91,12 +90,13 @@ def _boards(kind: Kind, rng: np.random.Generator) -> Iterator[dict[str, float]]:
 
 
 def _people(kind: Kind) -> Iterator[dict[str, float]]:
+    near, wide = AROUND_M
     for k in range(kind.people):
         escort = k < round(kind.escort * kind.people)
         yield {
-            "kind": LEGS if k % 3 == 0 else COAT, "radius": 0.24, "slow": 0.6, "fast": 1.3,
+            "kind": COAT if k % 3 else LEGS, "radius": 0.24, "slow": 0.6, "fast": 1.3,
             "rest_s": 3.0, "rests": 0.0 if escort else 0.2, "follows": 1.0 if escort else 0.1,
-            "near": AROUND_M[0], "wide": AROUND_M[1],
+            "near": near, "wide": wide,
         }  # fmt: skip
 
 

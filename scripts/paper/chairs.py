@@ -40,12 +40,9 @@ def reproduce(plan: Plan) -> None:
         report.say("RMSE, medians with quartiles:", quote=True)
         score_table(report, runs)
         report.say(verdict(runs), quote=True)
-    for variant, runs in by_variant.items():
-        single = runs[0]
-        errors = {
-            name: single.arrays[f"errors {name}"]
-            for name in ("odometry", "EKF", "shunting", "shunting, paper preset")
-        }
+    lines = ("odometry", "EKF", "shunting", "shunting, paper preset")
+    for variant, (single, *_) in by_variant.items():
+        errors = {name: single.arrays[f"errors {name}"] for name in lines}
         title = f"Chairs, {TITLES[variant]}, single run"
         report.figure(f"fig11-{variant}", fig11(single, title), f"Fig. 11: maps, {TITLES[variant]}")
         figure = pages.error_axes(single.arrays["seconds"], errors, title)
@@ -59,11 +56,7 @@ def fig11(run: Run, title: str) -> Any:
     """(a) EKF, (b) shunting on beams, (c) on features with the paper preset."""
     a = run.arrays
     names = ("EKF", "shunting", "shunting, paper preset")
-    maps = {
-        name: (a[f"activities {name}"], a[f"origin {name}"], float(a[f"cell {name}"]))
-        for name in names
-        if f"activities {name}" in a
-    }
+    maps = {name: pages.drawn(run, name) for name in names if f"activities {name}" in a}
     things = [a["truth"], a["ellipses EKF"], *(a[f"poses {name}"] for name in names)]
     whole = pages.window_over([*things, *(pages.active(*drawn) for drawn in maps.values())])
     figure, axes = pages.map_panels([whole], columns=3, width=14.0)
@@ -75,7 +68,7 @@ def fig11(run: Run, title: str) -> Any:
             figure.colorbar(image, ax=ax, label="activity", shrink=0.8)
         ax.plot(*a["truth"].T[:2], "-", color=pages.COLORS["truth"], lw=1.0, label="true path")
         ax.plot(*a[f"poses {name}"].T[:2], "--", color="#1f61be", lw=1.0, label="estimated path")
-        whole.show(ax)
+        pages.show(ax, whole)
         ax.set(title=f"({letter}) {name}")
     pages.legend_below(figure, axes)
     figure.suptitle(title)

@@ -7,7 +7,7 @@ import numpy as np
 
 from scripts.figures import styled
 from scripts.paper import room_pages
-from scripts.paper.report import Report, draw_activities, new_figure
+from scripts.paper.report import Report, draw_activities, drawn, new_figure
 from scripts.paper.runs import Plan, Run
 
 DYNAMISM = 0.5
@@ -29,9 +29,8 @@ def reproduce(plan: Plan) -> None:
     report.say(room_pages.verdict(runs), quote=True)
     for name, file in (("shunting", "fig13"), ("shunting, paper preset", "fig13-paper")):
         report.figure(file, fig13(runs[0], name), f"Fig. 13: office, {name}, single run")
-    report.figure(
-        "rmse", room_pages.fig_rmse({"office": runs}), "RMSE of every seed; bars are medians"
-    )
+    figure = room_pages.fig_rmse({"office": runs})
+    report.figure("rmse", figure, "RMSE of every seed; bars are medians")
     report.finish("Office (paper: section 4.3, Fig. 13)")
 
 
@@ -43,10 +42,9 @@ def fig13(run: Run, name: str) -> Any:
     ax.grid(visible=False)
     # beneath the activities, which cover it only as far as they are high
     ax.plot(*a["raw"].T, ".", color="#1f61be", ms=6.0, mew=0.0, label="raw LIDAR", zorder=1)
-    origin, cell = a[f"origin {name}"], float(a[f"cell {name}"])
-    image = draw_activities(ax, a[f"activities {name}"], origin, cell, "YlOrRd")
-    activities = a[f"activities {name}"].astype(np.float32)
-    image.set(zorder=2, alpha=np.clip(0.3 + 1.5 * activities, 0.0, 1.0))
+    activities, origin, cell = drawn(run, name)
+    image = draw_activities(ax, activities, origin, cell, "YlOrRd")
+    image.set(zorder=2, alpha=np.clip(0.3 + 1.5 * activities.astype(np.float32), 0.0, 1.0))
     ax.plot(*a[f"poses {name}"].T[:2], "k.", ms=2.0, label="trajectory", zorder=4)
     low, high = a["raw"].min(axis=0) - 0.5, a["raw"].max(axis=0) + 0.5
     ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title=f"Office, {name}")

@@ -6,9 +6,9 @@ error of poses, told by loops and by GPS; it deletes nothing. So landmarks are l
 place by place: those within ``NEAR_M`` of the laser, by a rigid fit of their own.
 """
 
-from collections.abc import Iterable
-from dataclasses import dataclass
+from collections.abc import Iterable, Sequence
 from itertools import pairwise
+from operator import itemgetter
 from typing import Any
 
 import numpy as np
@@ -85,12 +85,10 @@ def loops(track: Trajectory) -> list[tuple[int, int]]:
 
 def loop_errors(track: Trajectory, graph: Trajectory) -> Float:
     """(n,) m: motion from the earlier to the later frame of a loop, against the graph's."""
-    errors = []
-    for a, b in loops(graph):
-        mine = se2.between(track.poses[a], track.poses[b])
-        told = se2.between(graph.poses[a], graph.poses[b])
-        errors.append(float(np.hypot(*(mine - told)[:2])))
-    return np.array(errors)
+    steps = (
+        [se2.between(one.poses[a], one.poses[b]) for one in (track, graph)] for a, b in loops(graph)
+    )
+    return np.array([float(np.hypot(*(mine - told)[:2])) for mine, told in steps])
 
 
 def over_graph(track: Trajectory, graph: Trajectory, gps: GpsTrack) -> Float:
@@ -132,95 +130,72 @@ CLOSING_M = (8.0, 6.0, 4.0, 3.0, GATE_M, GATE_M)  # gates of the rounds of a fit
 FEWEST = 4  # pairs that say how a place lies
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Place:
-    """A stop on the way: where a SLAM thought to be, and T_graph_map if it was right there."""
-
-    here: Float
-    T_graph_map: Float
-
-    def near(self, points: Float) -> NDArray[np.bool_]:
-        """(n,) which are within ``NEAR_M`` of here."""
-        away = points - self.here
-        close: NDArray[np.bool_] = np.hypot(away[:, 0], away[:, 1]) < NEAR_M
-        return close
+Laid = tuple[int, Float]
+"""How many pairs agree, and T_graph_map: how a place lies over the graph."""
+Place = tuple[Float, Float]
+"""A stop on the way: where a SLAM thought to be (2,), and T_graph_map if it was right there."""
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class Laid:
-    """How a place lies over the graph, and how many pairs agree."""
-
-    T_graph_map: Float
-    pairs: int = 0
+def near(points: Float, here: Float) -> NDArray[np.bool_]:
+    """(n,) which are within ``NEAR_M`` of a place."""
+    close: NDArray[np.bool_] = np.hypot(*(points - here).T) < NEAR_M
+    return close
 
 
-@dataclass(frozen=True, eq=False)
-class Surveyor:
-    """Lays landmarks over the graph's ``trunks`` (m, 2)."""
+def lay(points: Float, trunks: Float, starts: Iterable[Float]) -> Laid:
+    """The rigid fit in which the most are paired, from any of these T_graph_map."""
+    best: Laid = (-1, np.zeros(3))
+    for T in starts:
+        for gate in CLOSING_M:
+            rows, columns = paired(se2.transform(T, points), trunks, gate)
+            if len(rows) < FEWEST:
+                break
+            T = se2.fit(points[rows], trunks[columns])
+        pairs = len(paired(se2.transform(T, points), trunks, GATE_M)[0])
+        if pairs > best[0]:
+            best = pairs, T
+    return best
 
-    trunks: Float
 
-    def lay(self, points: Float, starts: Iterable[Laid]) -> Laid:
-        """The rigid fit in which the most are paired, from any of these starts."""
-        best = Laid(T_graph_map=np.zeros(3), pairs=-1)
-        for start in starts:
-            T = start.T_graph_map
-            for gate in CLOSING_M:
-                rows, columns = paired(se2.transform(T, points), self.trunks, gate)
-                if len(rows) < FEWEST:
-                    break
-                T = se2.fit(points[rows], self.trunks[columns])
-            pairs = len(paired(se2.transform(T, points), self.trunks, GATE_M)[0])
-            if pairs > best.pairs:
-                best = Laid(T_graph_map=T, pairs=pairs)
-        return best
-
-    def unbent(self, points: Float, places: list[Place]) -> Float:
-        """(n, 2) a whole map over the graph: each landmark by the fit with the most pairs of all
-        places near it. A place starts from the poses there, and from the fits of its neighbours on
-        the way, since a map moves after it was made, where a loop closes."""
-        fits: dict[int, Laid] = {}
-        for order in (range(len(places)), range(len(places) - 1, -1, -1)):
-            before: list[Laid] = []
-            for k in order:
-                near = places[k].near(points)
-                if near.sum() < FEWEST:
-                    continue
-                known = [fits[k]] if k in fits else [Laid(T_graph_map=places[k].T_graph_map)]
-                new = self.lay(points[near], [*known, *before])
-                fits[k] = max([*known, new], key=lambda fit: fit.pairs)
-                before = [fits[k]]
-        moved = se2.transform(places[-1].T_graph_map, points)
-        most = np.full(len(points), -1)
-        for k, fit in fits.items():
-            better = places[k].near(points) & (most < fit.pairs)
-            moved[better] = se2.transform(fit.T_graph_map, points[better])
-            most[better] = fit.pairs
-        return moved
+def unbent(points: Float, trunks: Float, places: Sequence[Place]) -> Float:
+    """(n, 2) a whole map over the graph: each landmark by the fit with the most pairs of all
+    places near it. A place starts from the poses there, and from the fits of its neighbours on
+    the way, since a map moves after it was made, where a loop closes."""
+    fits: dict[int, Laid] = {}
+    for order in (range(len(places)), range(len(places) - 1, -1, -1)):
+        before: list[Float] = []
+        for k in order:
+            here, T_graph_map = places[k]
+            own = points[near(points, here)]
+            if len(own) >= FEWEST:
+                known = fits.get(k, (0, T_graph_map))
+                fits[k] = max(known, lay(own, trunks, [known[1], *before]), key=itemgetter(0))
+                before = [fits[k][1]]
+    moved = se2.transform(places[-1][1], points)
+    most = np.full(len(points), -1)
+    for k, (pairs, T) in fits.items():
+        better = near(points, places[k][0]) & (most < pairs)
+        moved[better] = se2.transform(T, points[better])
+        most[better] = pairs
+    return moved
 
 
 def census_of(run: Run, trunks: Float, track: Trajectory, graph: Trajectory) -> Census:
     """What a map held at each stop, near it, and what it holds in the end."""
-    surveyor, census = Surveyor(trunks), Census(trunks)
-    places = [
-        Place(
-            here=track.poses[k, :2],
-            T_graph_map=se2.compose(graph.poses[k], se2.inverse(track.poses[k])),
-        )
-        for k in run.arrays["stops"].tolist()
-    ]
+    census = Census(trunks)
+    stops = run.arrays["stops"]
+    pairs = zip(track.poses[stops], graph.poses[stops], strict=True)
+    places = [(pose[:2], se2.compose(true, se2.inverse(pose))) for pose, true in pairs]
     ends = np.cumsum([0, *run.numbers["sizes"]]).tolist()
-    before: list[Laid] = []
+    before: list[Float] = []
     points, names = np.zeros((0, 2)), np.zeros(0, dtype=np.int64)
-    for place, (a, b) in zip(places, pairwise(ends), strict=True):
+    for (here, T_graph_map), (a, b) in zip(places, pairwise(ends), strict=True):
         points, names = run.arrays["found"][a:b], run.arrays["names"][a:b]
-        near = place.near(points)
-        if near.sum() < FEWEST:
-            continue
-        start = Laid(T_graph_map=place.T_graph_map)
-        before = [surveyor.lay(points[near], [start, *before])]
-        census.take(se2.transform(before[0].T_graph_map, points[near]), names[near], GATE_M)
-    census.take(surveyor.unbent(points, places), names, GATE_M)
+        own = near(points, here)
+        if own.sum() >= FEWEST:
+            before = [lay(points[own], trunks, [T_graph_map, *before])[1]]
+            census.take(se2.transform(before[0], points[own]), names[own], GATE_M)
+    census.take(unbent(points, trunks, places), names, GATE_M)
     return census
 
 

@@ -2,7 +2,7 @@
 """What an experiment leaves: figures as PNG and SVG, a Markdown table, the recipe."""
 
 import math
-from collections.abc import Iterable, Mapping, Sequence
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from dataclasses import asdict, dataclass, field
 from typing import Any
 
@@ -12,6 +12,7 @@ from matplotlib.axes import Axes
 from matplotlib.collections import EllipseCollection
 from matplotlib.figure import Figure
 from matplotlib.patches import Rectangle
+from matplotlib.transforms import Bbox
 from numpy.typing import NDArray
 from scipy.ndimage import maximum_filter
 
@@ -19,7 +20,7 @@ from scripts.jobs import Job, run_jobs
 from scripts.machine import machine
 from scripts.marks import table
 from scripts.output import write_recipe
-from scripts.paper.runs import Plan, Run, checksums, load_run, spread
+from scripts.paper.runs import Plan, Run, checksums, load_run, spread, spread_text
 from slam import create
 from slam.files import refuse_links, replacing, write_text
 from slam.frames import Float
@@ -208,40 +209,28 @@ def error_axes(seconds: Float, errors: Mapping[str, Float], title: str) -> Figur
 FAINTEST = 0.02  # activity that is drawn
 
 
-@dataclass(frozen=True, kw_only=True)
-class Window:
-    """What of the plane is shown, m."""
-
-    xmin: float
-    ymin: float
-    xmax: float
-    ymax: float
-
-    def show(self, ax: Axes) -> None:
-        """Of these axes, this only."""
-        ax.set(xlim=(self.xmin, self.xmax), ylim=(self.ymin, self.ymax), aspect="equal")
-
-    def mark(self, ax: Axes) -> None:
-        """As a frame, in axes that show more."""
-        size = self.xmax - self.xmin, self.ymax - self.ymin
-        frame = Rectangle((self.xmin, self.ymin), *size, fill=False, ec="#ce2c3c", lw=1.2, zorder=9)
-        ax.add_patch(frame)
+def show(ax: Axes, window: Bbox) -> None:
+    """Of these axes, this part of the plane only, m."""
+    ax.set(xlim=window.intervalx, ylim=window.intervaly, aspect="equal")
 
 
-def window_over(things: Iterable[Float]) -> Window:
-    """All (n, 2) points, and a little beside them."""
+def mark(ax: Axes, window: Bbox) -> None:
+    """As a frame, in axes that show more."""
+    size = window.width, window.height
+    ax.add_patch(Rectangle(window.min, *size, fill=False, ec="#ce2c3c", lw=1.2, zorder=9))
+
+
+def window_over(things: Iterable[Float]) -> Bbox:
+    """All (n, 2) points, and a little beside them, m."""
     points = np.concatenate([np.asarray(thing)[:, :2] for thing in things])
     low, high = points.min(axis=0), points.max(axis=0)
     edge = 0.03 * float((high - low).max())
-    xmin, ymin = (low - edge).tolist()
-    xmax, ymax = (high + edge).tolist()
-    return Window(xmin=xmin, ymin=ymin, xmax=xmax, ymax=ymax)
+    return Bbox([low - edge, high + edge])
 
 
-def window_about(middle: Float, half: float) -> Window:
-    """A square."""
-    x, y = float(middle[0]), float(middle[1])
-    return Window(xmin=x - half, ymin=y - half, xmax=x + half, ymax=y + half)
+def window_about(middle: Float, half: float) -> Bbox:
+    """A square, m."""
+    return Bbox([middle - half, middle + half])
 
 
 def active(values: NDArray[Any], origin: Float, cell: float) -> Float:
@@ -250,18 +239,53 @@ def active(values: NDArray[Any], origin: Float, cell: float) -> Float:
     return (np.column_stack([columns, rows]) + 0.5) * cell + np.asarray(origin)[:2]
 
 
-def map_panels(windows: Sequence[Window], columns: int, width: float) -> tuple[Figure, Any]:
+def map_panels(windows: Sequence[Bbox], columns: int, width: float) -> tuple[Figure, Any]:
     """Axes, row by row, in a figure of the height that leaves no white about these windows; all of
     a row have one window."""
     wide = (width - 0.9) / columns - 0.6
     height = 0.5
     for window in windows:
-        height += wide * (window.ymax - window.ymin) / (window.xmax - window.xmin) + 0.7
+        height += wide * window.height / window.width + 0.7
     figure, axes = new_figure(width, height, rows=len(windows), columns=columns)
     for k, ax in enumerate(axes):
-        windows[k // columns].show(ax)
+        show(ax, windows[k // columns])
         ax.set(ylabel="y in m" if k % columns == 0 else "", xlabel="x in m")
     return figure, axes
+
+
+def drawn(run: Run, name: str = "") -> tuple[Any, Float, float]:
+    """Activities, origin and cell of a map in a run."""
+    a, of = run.arrays, name and f" {name}"
+    return a[f"activities{of}"], a[f"origin{of}"], float(a[f"cell{of}"])
+
+
+def both_maps(
+    runs: Mapping[str, Run],
+    whole: Bbox,
+    part: Bbox,
+    also: Callable[[Axes, str, bool], None],
+    *,
+    width: float,
+    dots: tuple[float, float] = (2.5, 2.5),
+) -> Figure:
+    """EKF with 3 sigma ellipses beside the shunting map's activities, and below a part of both.
+
+    also  draws what else is in the axes of a SLAM, and their title; True: the part
+    dots  in the ellipses of the whole and of the part
+    """
+    figure, axes = map_panels([whole, part], columns=2, width=width)
+    for k, ax in enumerate(axes):
+        name, below = ("EKF", "shunting")[k % 2], k >= 2
+        if name == "EKF":
+            ellipses = runs[name].arrays["ellipses"]
+            draw_ellipses(ax, ellipses, label="landmark, 3 σ", dot=dots[below])
+        else:
+            image = draw_activities(ax, *drawn(runs[name]), "Greys", swell=not below)
+        also(ax, name, below)
+        show(ax, part if below else whole)
+    figure.colorbar(image, ax=list(axes), shrink=0.5, aspect=40, label="activity")
+    legend_below(figure, axes)
+    return figure
 
 
 def legend_below(figure: Figure, axes: Iterable[Axes]) -> None:
@@ -283,12 +307,8 @@ def paper_table(
     Of means the median over the seeds is that of their size, as signs differ from seed to seed.
     """
     many = len(runs) > 1
-    ours = (
-        "our single run, and medians with quartiles over the seeds, of means the median of their "
-        "size"
-        if many
-        else "our one run"
-    )
+    seeds = "medians with quartiles over the seeds, of means the median of their size"
+    ours = f"our single run, and {seeds}" if many else "our one run"
     report.say(
         f"**{title}**: the paper's numbers, {ours}. var(p) is printed, not compared.", quote=True
     )
@@ -303,15 +323,17 @@ def paper_table(
             squared = "" if place == 0 else "²"
             row = [f"{quantity}: {label}, {unit}{squared}"]
             row += [f"{printed[who][quantity][place]:.4f}" for who in ("EKF", "shunting")]
-            row += [_cell(runs[0][name].get(f"{key} {quantity}")) for name in columns]
+            number = f"{key} {quantity}"
+            row += [_cell(runs[0][name].get(number)) for name in columns]
             if many:
-                row += [
-                    spread(abs(run[name].get(f"{key} {quantity}", float("nan"))) for run in runs)
-                    .text("{:.2g}")
-                    for name in columns
-                ]  # fmt: skip
+                row += [spread_text(sizes(runs, name, number), ".2g") for name in columns]
             rows.append(row)
     report.table(head, rows, quote=True)
+
+
+def sizes(runs: Sequence[Numbers], name: str, key: str) -> list[float]:
+    """|that number| of a SLAM in each run; NaN where it has none."""
+    return [abs(run[name].get(key, math.nan)) for run in runs]
 
 
 def _cell(value: float | None) -> str:
@@ -325,11 +347,9 @@ def below_printed(
     ``limits`` (quantity -> (mean, var)); in words, short-falls in bold."""
     out = []
     for quantity, (mean, var_e, _) in printed["shunting"].items():
-        want = limits.get(quantity, (abs(mean), var_e)) if limits else (abs(mean), var_e)
+        want = (limits or {}).get(quantity, (abs(mean), var_e))
         for key, most in (("mean", want[0]), ("var_e", want[1])):
-            got = spread(
-                abs(run[name].get(f"{key} {quantity}", float("nan"))) for run in runs
-            ).median
+            got, _, _ = spread(sizes(runs, name, f"{key} {quantity}"))
             sign = "|mean(e)|" if key == "mean" else "var(e)"
             told = f"{quantity} {sign} {got:.2g} against {most:.2g}"
             out.append(told if got <= most else f"**{told}: short**")

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The runs, tables and figures that the experiments in rooms share."""
 
-import math
 from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from typing import Any
@@ -11,7 +10,7 @@ import numpy as np
 from scripts.paper import rooms
 from scripts.paper.report import COLORS, Report, new_figure
 from scripts.paper.rooms import FAILED_M, FAILED_RAD, SYSTEMS
-from scripts.paper.runs import Plan, Run, SignTest, job, sign_test, spread
+from scripts.paper.runs import Plan, Run, beaten, job, sign_test, spread_text
 from slam.frames import Float
 
 NAMES = tuple(SYSTEMS)
@@ -29,55 +28,49 @@ def run_all(
     """Every variant (name -> options of the scene) over all seeds."""
     seconds = 8.0 if plan.quick else SECONDS
     seeds = plan.seed_list()
+    cases = {(v, seed): f"{v}-seed-{seed}" for v in variants for seed in seeds}
+    room = {"scene": scene, "dynamism": dynamism, "seconds": seconds}
     runs = report.run(
-        job(
-            f"{variant}-seed-{seed}",
-            rooms.run_one,
-            scene=scene,
-            options=options,
-            dynamism=dynamism,
-            seed=seed,
-            seconds=seconds,
-            keep=seed == seeds[0],
-        )
-        for variant, options in variants.items()
-        for seed in seeds
+        job(name, rooms.run_one, **room, options=variants[v], seed=seed, keep=seed == seeds[0])
+        for (v, seed), name in cases.items()
     )
     report.systems(SYSTEMS)
-    return {v: [runs[f"{v}-seed-{seed}"] for seed in seeds] for v in variants}
+    return {v: [runs[cases[v, seed]] for seed in seeds] for v in variants}
 
 
 def score_table(report: Report, runs: Sequence[Run]) -> None:
     """RMSE, heading and failures of every SLAM, and who wins against the EKF."""
     rows = []
-    theirs = [run.numbers["EKF"]["rmse_m"] for run in runs]
     for name in NAMES:
         numbers = [run.numbers[name] for run in runs]
-        mine = [n["rmse_m"] for n in numbers]
-        test = "" if name == "EKF" else sign_test(mine, theirs).text()
+        rmse = [n["rmse_m"] for n in numbers]
         rows.append(
             [
                 name,
-                spread(mine).text("{:.4f}"),
-                f"{max(mine):.4f}",
-                spread(n["heading_rmse_rad"] for n in numbers).text("{:.4f}"),
+                spread_text(rmse, ".4f"),
+                f"{max(rmse):.4f}",
+                spread_text((n["heading_rmse_rad"] for n in numbers), ".4f"),
                 f"{sum(n['failed'] for n in numbers)} of {len(numbers)}",
-                spread(n["ms"] for n in numbers).text("{:.1f}"),
-                test,
+                spread_text((n["ms"] for n in numbers), ".1f"),
+                "" if name == "EKF" else against_ekf(name, runs)[1],
             ]
         )
     head = ["", "RMSE, m", "worst, m", "heading RMSE, rad", "failed", "CPU per scan, ms"]
     report.table([*head, "seeds won : lost against the EKF"], rows, quote=True)
 
 
+def against_ekf(name: str, runs: Sequence[Run]) -> tuple[int, str]:
+    """``sign_test`` of the RMSE."""
+    return sign_test(*([run.numbers[of]["rmse_m"] for run in runs] for of in (name, "EKF")))
+
+
 def verdict(runs: Sequence[Run]) -> str:
     """Whether the shunting SLAM beats our EKF as the project wants it to: 17 of 20 seeds."""
-    mine = [run.numbers["shunting"]["rmse_m"] for run in runs]
-    test: SignTest = sign_test(mine, [run.numbers["EKF"]["rmse_m"] for run in runs])
-    told = f"Shunting on beams against our EKF: {test.text()}"
+    wins, words = against_ekf("shunting", runs)
+    told = f"Shunting on beams against our EKF: {words}"
     if len(runs) < 20:
         return f"{told}; the target is 17 of 20 seeds, these are too few to say."
-    met = test.wins >= math.ceil(0.85 * len(runs))
+    met = beaten(wins, len(runs))
     return f"{told}; the target (17 of 20) is met." if met else f"**{told}: target missed.**"
 
 

@@ -166,51 +166,36 @@ def statistics(errors: Float, names: Sequence[str]) -> dict[str, Any]:
     return out
 
 
-@dataclass(frozen=True, kw_only=True)
-class Spread:
-    """Median and quartiles over the ``n`` seeds of ``of`` that gave a number."""
-
-    median: float
-    low: float
-    high: float
-    n: int
-    of: int
-
-    def text(self, form: str = "{:.3g}") -> str:
-        """``median [low, high]``, and of how many when not of all."""
-        if not self.n:
-            return "–"
-        middle, low, high = (form.format(v) for v in (self.median, self.low, self.high))
-        told = f"{middle} [{low}, {high}]" if self.n > 1 else middle
-        return told if self.n == self.of else f"{told} ({self.n} of {self.of})"
+def spread(values: Iterable[float]) -> tuple[float, float, float]:
+    """Median and quartiles of the finite ones; NaN where there is none."""
+    listed = _finite(values)
+    low, median, high = np.percentile(listed, [25, 50, 75]).tolist() if listed else [math.nan] * 3
+    return median, low, high
 
 
-def spread(values: Iterable[float]) -> Spread:
-    """Of finite values, ``n`` of them; NaN where there is none."""
+def spread_text(values: Iterable[float], form: str = ".3g") -> str:
+    """``median [low, high]`` over the seeds, and of how many when not all gave a number."""
     listed = list(values)
-    finite = np.array([v for v in listed if v is not None and math.isfinite(v)])
-    if len(finite) == 0:
-        return Spread(median=math.nan, low=math.nan, high=math.nan, n=0, of=len(listed))
-    low, median, high = (float(v) for v in np.percentile(finite, [25, 50, 75]))
-    return Spread(median=median, low=low, high=high, n=len(finite), of=len(listed))
+    n = len(_finite(listed))
+    if not n:
+        return "–"
+    middle, low, high = (format(v, form) for v in spread(listed))
+    told = f"{middle} [{low}, {high}]" if n > 1 else middle
+    return told if n == len(listed) else f"{told} ({n} of {len(listed)})"
 
 
-@dataclass(frozen=True, kw_only=True)
-class SignTest:
-    """How often the first of a pair was the smaller, and the two-sided probability of that or
-    more by chance."""
-
-    wins: int
-    losses: int
-    p: float
-
-    def text(self) -> str:
-        """One cell of a table."""
-        return f"{self.wins} : {self.losses}, p = {self.p:.2g}"
+def _finite(values: Iterable[float]) -> list[float]:
+    return [v for v in values if v is not None and math.isfinite(v)]
 
 
-def sign_test(first: Sequence[float], second: Sequence[float]) -> SignTest:
-    """Paired by seed; ties count for neither, no number (NaN) loses against any."""
+def sign_test(first: Sequence[float], second: Sequence[float]) -> tuple[int, str]:
+    """In how many pairs of a seed the first is the smaller; wins, losses and the two-sided
+    probability of that by chance, in words. No number (NaN) loses against any."""
     a, b = ([math.inf if math.isnan(v) else v for v in values] for values in (first, second))
     row = paired(a, b, less_is_better=True)
-    return SignTest(wins=row["wins"], losses=row["losses"], p=row["p_sign"])
+    return row["wins"], f"{row['wins']} : {row['losses']}, p = {row['p_sign']:.2g}"
+
+
+def beaten(wins: int, n: int) -> bool:
+    """Whether so many of ``n`` seeds are the project's target: 17 of 20."""
+    return wins >= math.ceil(0.85 * n)

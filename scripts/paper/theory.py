@@ -7,8 +7,7 @@ What it claims of single neurons is held by ``tests/slam/shunting/map`` and
 
 import time
 from collections.abc import Sequence
-from dataclasses import dataclass, field
-from itertools import pairwise
+from itertools import accumulate, count, islice, pairwise
 from typing import Any
 
 import numpy as np
@@ -27,7 +26,7 @@ from slam.frontend.observations import Observations, from_features, from_scan
 from slam.frontend.odometry_steps import thinned
 from slam.shunting.featured import FeaturedShuntingSlam
 from slam.shunting.slam import ShuntingConfig, ShuntingSlam
-from slam.tracker.cells import SIDE, Look
+from slam.tracker.cells import SIDE, Look, living
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
@@ -56,28 +55,26 @@ def reproduce(plan: Plan) -> None:
 
 
 def _scaling(report: Report, frame: Frame, rooms: tuple[int, ...]) -> None:
-    s = scaling(frame, rooms)
+    rows = scaling(frame, rooms)
+    area, alive, visited, update_ms, match_ms = zip(*rows, strict=True)
     figure, axes = new_figure(9.0, 3.8, columns=2)
-    axes[0].plot(s.area, s.update_ms, "o-", color=RED, label="update of the network")
-    axes[0].plot(s.area, s.match_ms, "s-", color=BLUE, label="matching")
+    axes[0].plot(area, update_ms, "o-", color=RED, label="update of the network")
+    axes[0].plot(area, match_ms, "s-", color=BLUE, label="matching")
     axes[0].set(xscale="log", xlabel="area of the map in m²", ylabel="CPU in ms", ylim=(0, None))
-    axes[1].plot(s.area, s.alive, "o-", color=GREY, label="alive in the map")
-    axes[1].plot(s.area, s.visited, "o-", color=RED, label="visited by an update")
+    axes[1].plot(area, alive, "o-", color=GREY, label="alive in the map")
+    axes[1].plot(area, visited, "o-", color=RED, label="visited by an update")
     axes[1].set(xscale="log", yscale="log", xlabel="area of the map in m²", ylabel="neurons")
     for ax in axes:
         ax.legend(frameon=False)
     report.heading("Time against the size of the map (3.4)")
-    rows = [
-        [f"{a:.0f}", str(n), str(v), f"{u:.2f}", f"{m:.2f}"]
-        for a, n, v, u, m in zip(s.area, s.alive, s.visited, s.update_ms, s.match_ms, strict=True)
-    ]
     head = ["area, m²", "neurons alive", "visited", "update, ms", "matching, ms"]
-    report.table(head, rows, quote=True)
-    same = "the same at every size" if len(set(s.visited)) == 1 else "**not the same**"
+    cells = ([f"{a:.0f}", str(n), str(v), f"{u:.2f}", f"{m:.2f}"] for a, n, v, u, m in rows)
+    report.table(head, cells, quote=True)
+    same = "the same at every size" if len(set(visited)) == 1 else "**not the same**"
     report.say(
         f"Neurons visited: {same}. Times are medians of process time; the largest over the "
-        f"smallest is {max(s.update_ms) / min(s.update_ms):.2f} for the update and "
-        f"{max(s.match_ms) / min(s.match_ms):.2f} for matching.",
+        f"smallest is {max(update_ms) / min(update_ms):.2f} for the update and "
+        f"{max(match_ms) / min(match_ms):.2f} for matching.",
         quote=True,
     )
     report.figure("scaling", figure, "One scan in maps of ever more area")
@@ -185,56 +182,32 @@ def fig5(activity: Float, given: Float, corner: tuple[int, int], cell: float) ->
     return figure
 
 
-@dataclass(eq=False)
-class Scaling:
-    """One row for each map size: m^2, neurons alive, neurons visited by an update, ms of an update
-    and of a match (medians of process time)."""
-
-    area: list[float] = field(default_factory=list)
-    alive: list[int] = field(default_factory=list)
-    visited: list[int] = field(default_factory=list)
-    update_ms: list[float] = field(default_factory=list)
-    match_ms: list[float] = field(default_factory=list)
+Scaled = tuple[float, int, int, float, float]
+"""Map size, m^2; neurons alive; neurons visited by an update; ms of an update and of a match
+(medians of process time)."""
 
 
-def scaling(frame: Frame, rooms: Sequence[int], repeats: int = 15) -> Scaling:
+def scaling(frame: Frame, rooms: Sequence[int], repeats: int = 15) -> list[Scaled]:
     """The same scan in maps that hold ever more copies of what it shows, ``PITCH_M`` apart."""
-    config = ShuntingConfig(range_m=9.0)
+    config, origin = ShuntingConfig(range_m=9.0), np.zeros(3)
     assert frame.scan is not None
-    seen = from_scan(frame.scan, np.zeros(3), config)
-    matcher, out = Matcher(config), Scaling()
-    network, made = Network(config), 0
-    for count in rooms:
-        for k in range(made, count):  # nearest first, so that the first one is the origin
-            _look(network, seen, _place(k))
-        made = count
-        update, match, visited = [], [], 0
-        for _ in range(repeats):
+    seen = from_scan(frame.scan, origin, config)
+    matcher, network, found = Matcher(config), Network(config), []
+    turns = (1j**turn for turn in count() for _ in range(turn // 2 + 1))
+    spiral = accumulate(turns, initial=0j)  # nearest first, so that the first one is the origin
+    for before, after in pairwise((0, *rooms)):
+        for at in islice(spiral, after - before):
+            _look(network, seen, np.array([at.real * PITCH_M, at.imag * PITCH_M, 0.0]))
+        spent, visited = np.zeros((repeats, 2)), 0
+        for k in range(repeats):
             start = time.process_time()
-            visited = _look(network, seen, np.zeros(3)).visited
+            visited = _look(network, seen, origin).visited
             middle = time.process_time()
-            matcher.climb(network, seen, np.array([0.02, 0.01, 0.01]), np.zeros(3), np.eye(3))
-            update.append(middle - start)
-            match.append(time.process_time() - middle)
-        out.area.append(count * PITCH_M**2)
-        out.alive.append(alive(network))
-        out.visited.append(visited)
-        out.update_ms.append(1e3 * float(np.median(update)))
-        out.match_ms.append(1e3 * float(np.median(match)))
-    return out
-
-
-def _place(k: int) -> Float:
-    """Cell k of a square spiral."""
-    x = y = 0
-    dx, dy, leg, left, turns = 1, 0, 1, 1, 0
-    for _ in range(k):
-        x, y, left = x + dx, y + dy, left - 1
-        if left == 0:
-            dx, dy, turns = -dy, dx, turns + 1
-            leg += turns % 2 == 0
-            left = leg
-    return np.array([x * PITCH_M, y * PITCH_M, 0.0])
+            matcher.climb(network, seen, np.array([0.02, 0.01, 0.01]), origin, np.eye(3))
+            spent[k] = middle - start, time.process_time() - middle
+        update_ms, match_ms = (1e3 * np.median(spent, axis=0)).tolist()
+        found.append((after * PITCH_M**2, alive(network), visited, update_ms, match_ms))
+    return found
 
 
 def _look(network: Network, seen: Observations, pose: Float) -> Look:
@@ -245,7 +218,7 @@ def _look(network: Network, seen: Observations, pose: Float) -> Look:
 
 def alive(network: Network) -> int:
     """Neurons that are not silent."""
-    slots = network.cells.directory[network.cells.directory >= 0]
+    slots, _ = living(network.cells)
     return int(((network.cells.x[slots] > 0.0) | (network.cells.y[slots] > 0.0)).sum())
 
 
@@ -279,11 +252,8 @@ def _free(frame: Frame, pose: Float) -> Float:
 def inputs_of(network: Network, shape: tuple[int, int], i0: int, j0: int) -> Float:
     """Dense I of the present impressions, neurons (i0 + column, j0 + row)."""
     cells, out = network.cells, np.zeros(shape)
-    for row, column in np.argwhere(cells.directory >= 0).tolist():
-        scratch = int(cells.scratch_of[cells.directory[row, column]])
-        if scratch < 0:
-            continue
-        j = (row + int(cells.corner[1])) * SIDE - j0
-        i = (column + int(cells.corner[0])) * SIDE - i0
-        out[j : j + SIDE, i : i + SIDE] = cells.impression[scratch]
+    for slot, place in zip(*living(cells), strict=True):
+        if (scratch := cells.scratch_of[slot]) >= 0:
+            i, j = place * SIDE - (i0, j0)
+            out[j : j + SIDE, i : i + SIDE] = cells.impression[scratch]
     return out

@@ -1,27 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """Section 4.1: Victoria Park (Figs. 6 and 7, Table 1), against GPS and the known associations."""
 
-from collections.abc import Mapping
 from typing import Any
 
 import numpy as np
+from matplotlib.axes import Axes
 
 from scripts.figures import styled
+from scripts.paper import park_scores as scores
 from scripts.paper import report as pages
 from scripts.paper.park_runs import SYSTEMS, read, run_graph, run_one
-from scripts.paper.park_scores import (
-    FASTEST,
-    FIRST_M,
-    GATE_M,
-    NEAR_M,
-    SLACK_M,
-    at_fixes,
-    first_fit,
-    good_fixes,
-    headings_off,
-    landmark_numbers,
-    pose_numbers,
-)
 from scripts.paper.runs import Plan, Run, job
 from slam import se2
 from slam.errors import InvalidValueError
@@ -61,9 +49,10 @@ def reproduce(plan: Plan) -> None:
     for name, run in by_name.items():
         if "final" in run.arrays:
             tracks[f"{name}, loops closed"] = _track(run, "final")
-    numbers = {name: pose_numbers(track, tracks["graph"], gps) for name, track in tracks.items()}
+    true = tracks["graph"]
+    numbers = {name: scores.pose_numbers(track, true, gps) for name, track in tracks.items()}
     for name, run in by_name.items():
-        numbers[name] |= landmark_numbers(run, graph, tracks[name], tracks["graph"], gps)
+        numbers[name] |= scores.landmark_numbers(run, graph, tracks[name], true, gps)
     _positions(report, numbers, gps)
     _table_1(report, numbers)
     _landmarks(report, numbers)
@@ -78,13 +67,14 @@ def _track(run: Run, key: str = "poses") -> Trajectory:
 
 
 def _positions(report: pages.Report, numbers: Numbers, gps: GpsTrack) -> None:
-    good = good_fixes(gps)
+    good = scores.good_fixes(gps)
     report.heading("Positions against GPS")
     report.say(
         f"{len(good)} fixes, {int((~good).sum())} of them outliers by the rule (farther than "
-        f"{SLACK_M:g} m + {FASTEST:g} m/s from the last good one). GPS and log share a clock. "
-        f"Aligned by the good fixes of the first {FIRST_M:g} m only; “shape” is what remains after "
-        "a robust fit to all of them. Compared are positions of the laser: the dataset does not "
+        f"{scores.SLACK_M:g} m + {scores.FASTEST:g} m/s from the last good one). GPS and log share "
+        f"a clock. Aligned by the good fixes of the first {scores.FIRST_M:g} m only; “shape” is "
+        "what remains after a robust fit to all of them. Compared are positions of the laser: the "
+        "dataset does not "
         "say where on the truck the antenna was, so a lever arm of a metre or two, which turns "
         "with the truck, is in every error here, the graph's too. Loops: motion between two visits "
         "of a place, against the graph with known associations, optimised by least squares."
@@ -92,9 +82,9 @@ def _positions(report: pages.Report, numbers: Numbers, gps: GpsTrack) -> None:
     floor = numbers["graph"]
     rows = []
     for name, n in numbers.items():
-        values = [n["rmse"], n["median"], n["p90"], n["shape median"], n["shape p90"]]
-        values += [n["rmse"] / floor["rmse"], n["loop median"], n["loop worst"]]
-        rows.append([name, *(f"{v:.2f}" for v in values)])
+        values = {**n, "share": n["rmse"] / floor["rmse"]}
+        keys = ("rmse", "median", "p90", "shape median", "shape p90", "share", "loop median")
+        rows.append([name, *(f"{values[key]:.2f}" for key in (*keys, "loop worst"))])
     head = ["", "RMSE, m", "median", "90 %", "shape median", "shape 90 %", "RMSE / graph's"]
     report.table([*head, "loops median, m", "loops worst, m"], rows, quote=True)
     report.say(
@@ -123,19 +113,20 @@ def _table_1(report: pages.Report, numbers: Numbers) -> None:
 
 def _landmarks(report: pages.Report, numbers: Numbers) -> None:
     report.heading("Landmarks")
-    rows = []
-    for name, n in numbers.items():
-        if "misses" in n:
-            keys = ("landmarks", "misses", "spurious", "gone", "deleted by mistake")
-            counts = [str(n[key]) for key in (*keys, "not converged")]
-            rows.append([name, *counts, f"{n['ms']:.1f}"])
+    keys = ("landmarks", "misses", "spurious", "gone", "deleted by mistake", "not converged")
+    rows = [
+        [name, *(str(n[key]) for key in keys), f"{n['ms']:.1f}"]
+        for name, n in numbers.items()
+        if "misses" in n
+    ]
     report.say(
         f"Against the {numbers['EKF']['trunks']} trunks of the graph, which are not all trees of "
         "the park: some of the spurious ones are real. Drift is not counted here: the landmarks "
-        f"within {NEAR_M:g} m of a place are laid over the graph's by a rigid fit, then matched "
-        f"within {GATE_M:g} m. Gone: matched once on the way, and in the end no landmark is at "
-        "this place. Deleted by mistake: of the EKF, whose landmarks have names, those gone of "
-        "which none is left that once was matched with this trunk; a shunting map has no names.",
+        f"within {scores.NEAR_M:g} m of a place are laid over the graph's by a rigid fit, then "
+        f"matched within {scores.GATE_M:g} m. Gone: matched once on the way, and in the end no "
+        "landmark is at this place. Deleted by mistake: of the EKF, whose landmarks have names, "
+        "those gone of which none is left that once was matched with this trunk; a shunting map "
+        "has no names.",
         quote=True,
     )
     head = ["", "in the map", "missed", "spurious", "gone", "deleted by mistake"]
@@ -146,35 +137,22 @@ def fig6(by_name: dict[str, Run], tracks: dict[str, Trajectory], gps: GpsTrack) 
     """Both maps whole, and one square of them."""
     fixes, things = {}, []
     for name in ("EKF", "shunting"):
-        a, T_map_gps = by_name[name].arrays, se2.inverse(first_fit(tracks[name], gps))
-        fixes[name] = se2.transform(T_map_gps, gps.points[good_fixes(gps)])
+        run, T_map_gps = by_name[name], se2.inverse(scores.first_fit(tracks[name], gps))
+        fixes[name] = se2.transform(T_map_gps, gps.points[scores.good_fixes(gps)])
         things += [fixes[name], tracks[name].poses]
-        things.append(a["ellipses"] if "ellipses" in a else pages.active(*_drawn(a)))
+        things.append(run.arrays["ellipses"] if name == "EKF" else pages.active(*pages.drawn(run)))
     middle = np.median(tracks["EKF"].poses[:, :2], axis=0)
     whole, part = pages.window_over(things), pages.window_about(middle, 20.0)
-    figure, axes = pages.map_panels([whole, part], columns=2, width=11.5)
-    for k, ax in enumerate(axes):
-        name = ("EKF", "shunting")[k % 2]
-        a = by_name[name].arrays
-        if "ellipses" in a:
-            pages.draw_ellipses(
-                ax, a["ellipses"], label="landmark, 3 σ", dot=0.5 if k >= 2 else 2.5
-            )
-        else:
-            image = pages.draw_activities(ax, *_drawn(a), "Greys", swell=k < 2)
+
+    def also(ax: Axes, name: str, below: bool) -> None:
         ax.plot(*fixes[name].T, ".", color=pages.COLORS["GPS"], ms=2.0, label="GPS")
         ax.plot(*tracks[name].poses.T[:2], "-", color="#1f61be", lw=0.9, label="path")
-        (part if k >= 2 else whole).show(ax)
-        ax.set(title=f"({'abcd'[k]}) {name}, {'framed part' if k >= 2 else 'whole'}")
-    for ax in axes[:2]:
-        part.mark(ax)
-    figure.colorbar(image, ax=list(axes), shrink=0.5, aspect=40, label="activity")
-    pages.legend_below(figure, axes)
-    return figure
+        letter = "abcd"[2 * below + (name == "shunting")]
+        ax.set(title=f"({letter}) {name}, {'framed part' if below else 'whole'}")
+        if not below:
+            pages.mark(ax, part)
 
-
-def _drawn(a: Mapping[str, Any]) -> tuple[Any, Float, float]:
-    return a["activities"], a["origin"], float(a["cell"])
+    return pages.both_maps(by_name, whole, part, also, width=11.5, dots=(2.5, 0.5))
 
 
 def broken(seconds: Float, errors: Float) -> tuple[Float, Float]:
@@ -188,19 +166,15 @@ def broken(seconds: Float, errors: Float) -> tuple[Float, Float]:
 
 def _fig7(report: pages.Report, tracks: dict[str, Trajectory], gps: GpsTrack) -> None:
     """x and y over GPS, heading against the graph, at the good fixes."""
-    good = good_fixes(gps)
+    good = scores.good_fixes(gps)
     seconds = (gps.stamps_ns[good] - gps.stamps_ns[0]) * 1e-9
     errors, times = {}, seconds
     for name in ("graph", "EKF", "shunting"):
         track = tracks[name]
-        e = se2.transform(first_fit(track, gps), at_fixes(track, gps)) - gps.points
-        turned = np.unwrap(headings_off(track, tracks["graph"], gps))
+        e = se2.transform(scores.first_fit(track, gps), scores.at_fixes(track, gps)) - gps.points
+        turned = np.unwrap(scores.headings_off(track, tracks["graph"], gps))
         turned = np.interp(gps.stamps_ns, track.stamps_ns, turned)
         times, errors[name] = broken(seconds, np.column_stack([e, turned])[good])
-    report.figure(
-        "fig7",
-        pages.error_axes(
-            times, errors, "Victoria Park: x, y against GPS, heading against the graph"
-        ),
-        f"Fig. 7: errors over time; nothing is drawn where GPS was silent for {GAP_S:g} s",
-    )
+    title = "Victoria Park: x, y against GPS, heading against the graph"
+    caption = f"Fig. 7: errors over time; nothing is drawn where GPS was silent for {GAP_S:g} s"
+    report.figure("fig7", pages.error_axes(times, errors, title), caption)

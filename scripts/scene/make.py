@@ -87,14 +87,8 @@ def gap_to_nowhere(scene: Scene) -> tuple[float, tuple[float, float]] | None:
     cell_m = max(CELL_M, math.sqrt((x1 - x0) * (y1 - y0) / MOST_CELLS))
     shape = (math.ceil((y1 - y0) / cell_m), math.ceil((x1 - x0) / cell_m))
     leaves = [
-        [
-            *_middle(scene.initial[m.name], 0.5 * m.radius),
-            0.5 * m.radius,
-            0.03,
-            scene.initial[m.name][2],
-        ]
-        for m in scene.movers
-        if m.group == "door"
+        [*_middle(scene.initial[m.name], half), half, 0.03, scene.initial[m.name][2]]
+        for m, half in ((m, 0.5 * m.radius) for m in scene.movers if m.group == "door")
     ]
     boxes = np.vstack([scene.obstacles.reshape(-1, 5), np.array(leaves).reshape(-1, 5)])
     walls = raster_of(boxes - [x0, y0, 0.0, 0.0, 0.0], shape, cell_m)
@@ -171,9 +165,7 @@ def over_map(map_: Raster, plan: MapPlan) -> Picture:
     def px(points: object) -> NDArray[np.int32]:
         """Pixels of points (n, 2) m."""
         at = np.asarray(points, dtype=np.float64).reshape(-1, 2)
-        return np.round(np.column_stack([(at[:, 0] - x0) * scale, (y1 - at[:, 1]) * scale])).astype(
-            np.int32
-        )
+        return np.round((at * [1.0, -1.0] + [-x0, y1]) * scale).astype(np.int32)
 
     picture = np.full((height, width, 3), UNKNOWN, dtype=np.uint8)
     known, occupied = _sampled(map_, (x0, y1), scale, (height, width))
@@ -221,9 +213,7 @@ def _sampled(
     occupied = np.zeros(shape, dtype=bool)
     occupied[i[inside], j[inside]] = True
     y, x = np.mgrid[: shape[0], : shape[1]]
-    points = np.column_stack(
-        [corner[0] + (x.ravel() + 0.5) / scale, corner[1] - (y.ravel() + 0.5) / scale]
-    )
+    points = corner + np.column_stack([x.ravel() + 0.5, -0.5 - y.ravel()]) / scale
     back = np.floor(se2.transform(se2.inverse(map_.T_map_origin), points) / map_.resolution_m)
     at_cell = back.astype(int)
     height, width = map_.values.shape
@@ -257,10 +247,8 @@ def picture() -> Picture:
     outline = f"[[0, -2], [{wide}, -2], [{wide}, {high}], [0, {high}], [0, -2]]"
     with TemporaryDirectory() as folder:
         file = Path(folder) / "kinds.toml"
-        file.write_text(
-            f"walls = [{outline}]\nstart = [1, -1, 0]\nseats = false\nput = [\n{put}\n]\n",
-            encoding="utf-8",
-        )
+        told = f"walls = [{outline}]\nstart = [1, -1, 0]\nseats = false\nput = [\n{put}\n]\n"
+        file.write_text(told, encoding="utf-8")
         scene = scenes.build(str(file))
     view = MapView(scene, PX, round(PX * (high + 3.2) / (wide + 1.2)))
     drawn = view.draw([scene.initial[mover.name] for mover in scene.movers])

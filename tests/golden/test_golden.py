@@ -15,6 +15,7 @@ from slam.evaluation import metrics
 from slam.trajectory import Trajectory
 from tests.golden.digests import MAKERS, TOLERANCE, Missing, on_intel, read
 
+pytestmark = pytest.mark.golden
 GOLDEN = read()
 RECORDED = ("frames/", "episode", "film")  # the rest are of SLAMs
 FUSED = "X86_V3"

@@ -30,6 +30,7 @@ from slam.shunting import ShuntingSlam
 from tests.hostile.folders import SCENE, SLAM, Hostile
 from tests.processes import python
 
+pytestmark = pytest.mark.fuzz
 REPO = Path(__file__).resolve().parents[2]
 STRIP = ["--strip", "s.png", "--at", "0.1"]
 REFUSED = "pass --trust"

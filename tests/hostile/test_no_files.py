@@ -19,6 +19,8 @@ from sim.simulation import n_frames
 from slam.errors import InvalidValueError, LogFormatError
 from slam.logs.bag_topics import Bag
 
+pytestmark = pytest.mark.fuzz
+
 
 @pytest.fixture
 def folder(tmp_path: Path) -> Path:

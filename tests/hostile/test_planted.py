@@ -31,6 +31,7 @@ from slam import locks
 from slam.errors import MobiliaError
 from slam.files import write_text
 
+pytestmark = pytest.mark.fuzz
 MOST_S = 5  # that a call may take
 PLANTED = 60  # a writer
 KINDS = ("file", "folder", "missing", "pipe", "socket", "device", "loop", "null")

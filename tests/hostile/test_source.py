@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.fuzz
 REPO = Path(__file__).resolve().parents[2]
 SOURCES = {
     path.relative_to(REPO).as_posix(): path.read_text()
@@ -40,7 +41,6 @@ IMPORTERS = {
     "scripts/live/replay.py": "the same",
     "scripts/live/page.py": "the same",
     "scripts/verbs/reproduce.py": "experiments of ours",
-    "scripts/experiments/study.py": "runs of ours",
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
     "sim/gym/workers.py": ["pickle"],  # settings and functions of who makes the rooms
@@ -52,7 +52,6 @@ STARTERS = {
     "sim/view/gl.py": "our own Python, without the working folder",
     "scripts/benches/ros2.py": "our own Python, as the other end of a link",
     "scripts/benches/shares.py": "perf and nm, on ourselves",
-    "scripts/benches/sides.py": "the Python of each of two checkouts",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/experiments/real_logs.py": "our own Python in each checkout, and git",
     "scripts/result_files.py": "git, for the commit of a results file",

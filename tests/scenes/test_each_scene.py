@@ -11,6 +11,8 @@ import scenes
 from slam.errors import InvalidValueError
 from tests.built_scenes import built, placed, reached
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("walls", ["visible", "none"])
 def test_walls_nobody_sees_still_hold_the_chairs(walls):

@@ -10,6 +10,8 @@ from slam.errors import InvalidValueError, UnknownNameError
 from tests.built_scenes import NAMES, built, model_bytes
 from tests.processes import python
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("name", "options"),

@@ -9,6 +9,7 @@ from scenes import registry
 from slam import system
 from tests.processes import python
 
+pytestmark = pytest.mark.slow
 SLOW = ("mujoco", "numba", "matplotlib", "scipy", "cv2", "rosbags", "joblib")
 _PROBE = """
 import sys

@@ -10,6 +10,8 @@ from scripts import marks
 from scripts.result_files import RESULTS, commit, load, write
 from slam.errors import InvalidValueError, LogFormatError
 
+pytestmark = pytest.mark.docs
+
 
 def test_a_long_table_goes_to_a_file_and_its_sum_stays(tmp_path: Path):
     rows = [f"| way {k} | {k} |" for k in range(marks.MOST_CELLS // 2)] + ["| all | 780 |"]

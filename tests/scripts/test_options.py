@@ -100,6 +100,7 @@ def test_levels_of_one_axis_leave_the_other_at_0_or_as_it_is_held():
         Axis(name="change", held=Held(change=0.5))
 
 
+@pytest.mark.slow
 def test_a_comparison_over_one_axis_names_it_everywhere(tmp_path: Path):
     axis = "change"
     plan = Plan(

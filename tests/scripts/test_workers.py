@@ -18,6 +18,7 @@ from slam.errors import MobiliaError, OutputError
 from slam.guests.wire import Wire
 from tests.processes import processes_with, python
 
+pytestmark = pytest.mark.slow
 REPO = Path(__file__).resolve().parents[2]
 MARK = "MOBILIA_TEST_WORKERS"
 

@@ -15,6 +15,7 @@ from sim.simulation import Simulation
 from slam.frames import BeamLabels, LaserSpec
 from tests.world2d import frame_at
 
+pytestmark = pytest.mark.slow
 MOVERS = [("chair0", "chair_swivel", 0.3), ("door0", "door", 0.9), ("someone", "person_coat", 0.25),
           ("robot", "robot", 0.25)]  # fmt: skip
 SPEC = LaserSpec(n_beams=2, angle_min=0.0, angle_increment=0.1)

@@ -14,6 +14,7 @@ from sim.simulation import Simulation, stream, tour
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import BeamClass, Frame, Odometry
 
+pytestmark = pytest.mark.slow
 DIGEST = """
 import hashlib, sys
 from sim.simulation import stream

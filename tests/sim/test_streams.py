@@ -12,6 +12,7 @@ from sim.driving.pilot import Pilot
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 
+pytestmark = pytest.mark.slow
 PARTS = ("layout", "chairs", "bins", "doors", "people", "lidar", "odometry", "driving")
 SECONDS = 5.0
 

@@ -18,6 +18,7 @@ from numba.core import event
 from slam._jit import COMPILING, announced, inner, uncounted
 from tests.processes import python
 
+pytestmark = pytest.mark.slow
 CALLEE = """
 from slam._jit import {} as jit
 @jit

@@ -2,14 +2,11 @@
 """The oracle by the true map: a known pose is found again, and a crowd does not make it lost."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 import slam
-from scripts.comparison.make import carry_out
-from scripts.comparison.plan import Plan
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
@@ -102,14 +99,3 @@ def test_it_is_a_control_that_must_be_shown_the_map():
     assert not said.converged  # no walls: odometry's
     assert said.T_map_robot.tolist() == [0.1, 0.0, 0.0]
     assert "map" not in slam.system.names()
-
-
-def test_in_a_comparison_it_gets_the_map_and_no_labels(tmp_path: Path):
-    """In a room with people, of which it is told nothing, it is nearer than odometry."""
-    plan = Plan(
-        slams=("oracle(map)", "odometry"), scenes=("arena",), levels=(1.0,), seeds=(7,),
-        seconds=4.0, scanner="noise", odometry="probabilistic_robotics", judge_maps=False,
-    )  # fmt: skip
-    mine, wheels = carry_out(plan, tmp_path)
-    assert (mine["outcome"], mine["lost"]) == ("finished", 0)
-    assert mine["ate_unaligned_m"] < 0.02 < wheels["ate_unaligned_m"]

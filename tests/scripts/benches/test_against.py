@@ -5,10 +5,7 @@ import numpy as np
 import pytest
 
 from scripts.benches import against
-from scripts.benches.world import DYNAMISM, SEED, note_poses
-from sim.sensors.lidar.device import LaserScanner
-from sim.sensors.lidar.models.lms221 import Lms221Config
-from sim.world.world import World
+from scripts.benches.world import scan
 
 
 def test_a_machine_that_slows_down_moves_the_times_and_not_the_ratio():
@@ -27,12 +24,10 @@ def test_the_interval_holds_the_median_in_96_of_100_tables():
 
 
 def test_mujocos_bare_rays_meet_what_the_scan_meets(monkeypatch: pytest.MonkeyPatch):
-    world = World("arena", seed=SEED, dynamism=DYNAMISM)
-    laser = LaserScanner(world.model, Lms221Config.ideal(), np.random.default_rng(0))
-    note_poses(laser.begin(world.data), int(laser.window.marks[1:].sum()))
-    scan, seen = laser.finish(), []
+    world, laser = against.at_rest("arena")
+    found, seen = scan(laser, world), []
     cast = against.mujoco.mj_multiRay
     monkeypatch.setattr(against.mujoco, "mj_multiRay", lambda *a: (cast(*a), seen.append(a)))
-    against.bare_rays(world, laser, 1)
-    assert np.array_equal(seen[0][7], scan.geoms)
-    assert np.array_equal(seen[0][8], scan.true_ranges)
+    against.bare_rays(world, laser, 1)()
+    assert np.array_equal(seen[0][7], found.geoms)
+    assert np.array_equal(seen[0][8], found.true_ranges)

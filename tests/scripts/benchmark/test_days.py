@@ -17,6 +17,7 @@ from scripts.results import check
 from slam.errors import LogFormatError
 from tests.scripts.report.made import OURS, OWN, session_of
 
+pytestmark = pytest.mark.slow
 PAGE = Path(__file__).resolve().parents[3] / "docs" / "leaderboard.md"
 
 

@@ -17,6 +17,7 @@ from scripts.comparison import again
 from scripts.comparison.folder import read
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
 DOCS = Path(__file__).resolve().parents[3] / "docs"
 SHORT = "--tracks busy-chairs --quick --seeds 1 --seconds 1.2"  # the same words, but minutes less
 MOST_LINES = 15

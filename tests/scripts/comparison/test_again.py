@@ -17,6 +17,7 @@ from scripts.debugger.recording import case_of, record
 from scripts.film.footage import open_run
 from slam.errors import InvalidValueError, LogFormatError
 
+pytestmark = pytest.mark.slow
 READERS = (open_run, lambda path: case_of(path, None, 1))  # of films and of inquests
 PLAN = {"scenes": ("arena",), "levels": (0.5,), "seeds": (7,), "scanner": "noise"}
 

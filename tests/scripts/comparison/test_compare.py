@@ -22,6 +22,7 @@ from scripts.verbs import compare as verb
 from slam import Estimate, Trajectory, se2, system
 from slam.errors import LogFormatError, OutputError
 
+pytestmark = pytest.mark.slow
 REPO = Path(__file__).resolve().parents[3]
 SECONDS = 1.6
 PLAN = {

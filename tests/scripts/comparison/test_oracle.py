@@ -4,6 +4,7 @@
 from pathlib import Path
 
 import numpy as np
+import pytest
 
 import slam
 from scripts.comparison import entry, folder, make
@@ -16,6 +17,7 @@ from slam.frames import BeamClass, Frame
 from slam.odometry import OdometrySlam
 from slam.replay import Replay
 
+pytestmark = pytest.mark.slow
 PLAN = {"scenes": ("arena",), "levels": (1.0,), "seeds": (7,), "seconds": 1.6}
 SEEN: list[list[Frame]] = []
 
@@ -74,3 +76,14 @@ def test_in_a_room_without_movers_the_oracle_is_the_slam():
         [e.T_map_robot.tobytes() for e in t.estimates] for t in replay.tracks.values()
     )
     assert all(other == first for other in others)
+
+
+def test_by_the_map_it_gets_the_map_and_no_labels(tmp_path: Path):
+    """In a room with people, of which it is told nothing, it is nearer than odometry."""
+    plan = Plan(
+        slams=("oracle(map)", "odometry"), scenes=("arena",), levels=(1.0,), seeds=(7,),
+        seconds=4.0, scanner="noise", odometry="probabilistic_robotics", judge_maps=False,
+    )  # fmt: skip
+    mine, wheels = make.carry_out(plan, tmp_path)
+    assert (mine["outcome"], mine["lost"]) == ("finished", 0)
+    assert mine["ate_unaligned_m"] < 0.02 < wheels["ate_unaligned_m"]

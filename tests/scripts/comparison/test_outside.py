@@ -20,6 +20,7 @@ from slam.guests import Limits
 from tests.scripts.comparison.hand_made import recording
 from tests.slam.guests import misbehaving
 
+pytestmark = pytest.mark.slow
 CLIENT = Path(misbehaving.__file__)
 
 

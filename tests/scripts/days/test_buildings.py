@@ -21,6 +21,7 @@ from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError, LogFormatError
 from tests.slam.guests import misbehaving
 
+pytestmark = pytest.mark.slow
 CRASHES = f"pipe:{sys.executable} -S -E {Path(misbehaving.__file__)} crash"
 PLAN = Plan(
     slams=("shunting", "odometry", CRASHES), scenes=("arena",), axis="change", levels=(0.3,),

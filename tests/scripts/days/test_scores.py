@@ -11,6 +11,7 @@ from scripts.days.truth import AGE_COLUMNS
 from scripts.report import score_tables
 from slam.evaluation.statistics import median_interval, share_interval
 
+pytestmark = pytest.mark.slow
 ROOM = {"scene": "room", "motion": 0.0, "change": 0.3}
 GHOSTS = (0.0, 0.01, 0.02, 0.03, 0.04, 0.05, 0.06)
 

@@ -14,6 +14,8 @@ from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.days.changes import Change
 from slam.tracker.belief.state import State
 
+pytestmark = pytest.mark.slow
+
 
 def spot(x, name, *, came=False, seen=True, asked=True, door=False):
     return Spot(at=(x, 0.0), name=name, came=came, seen=seen, asked=asked, door=door)

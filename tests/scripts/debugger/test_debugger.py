@@ -18,6 +18,7 @@ from sim.twins.absence import Change
 from slam.errors import SlamFailedError, UnknownNameError
 from slam.evaluation.lost import Divergence
 
+pytestmark = pytest.mark.slow
 SKITTISH = """
 import numpy as np
 from slam import Estimate, Trajectory, se2

@@ -14,6 +14,7 @@ from slam.tracker.belief.likelihood import ENDS
 from tests.world2d import Drive as Way
 from tests.world2d import World2D, frames, laser, rectangle
 
+pytestmark = pytest.mark.slow
 HALL = World2D(np.vstack([
     rectangle(-3.0, -2.0, 9.0, 4.0), rectangle(1.5, 1.0, 2.2, 2.0), rectangle(6.0, -1.5, 8.0, -1.0),
 ]))  # fmt: skip

@@ -11,6 +11,7 @@ from scripts.experiments import relations
 from slam import se2
 from slam.errors import LogFormatError
 
+pytestmark = pytest.mark.slow
 POSES = np.array([se2.exp([1.0, 0.0, 0.1], t) for t in range(10)])
 TIMES = np.arange(10.0)
 

@@ -8,6 +8,7 @@ from scripts.experiments import revisits
 from slam import se2
 from tests.world2d import World2D, frame_at, laser, rectangle
 
+pytestmark = pytest.mark.slow
 ROOM = World2D(np.vstack([rectangle(-3.0, -2.0, 5.0, 6.0), rectangle(1.5, 1.0, 2.2, 2.0)]))
 SPEC = laser(181)
 

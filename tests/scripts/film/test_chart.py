@@ -12,6 +12,7 @@ from sim.events import KIDNAP, Event
 from sim.view.draw import INK, MAGENTA, ORANGE, RED, paler
 from sim.view.moment import Shown
 
+pytestmark = pytest.mark.film
 COLORS = {"shunting": RED, "odometry": ORANGE}
 LANES = ("chair", "door", "unsure")
 

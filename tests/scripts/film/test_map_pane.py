@@ -10,6 +10,8 @@ from sim.view.moment import MOST_POINTS, Path
 from slam import se2
 from slam.system import Raster
 
+pytestmark = pytest.mark.film
+
 
 @pytest.mark.parametrize("yaw", [0.0, 0.5, np.pi / 2.0, -2.0])
 def test_a_cell_is_drawn_at_its_place(yaw: float):

@@ -13,6 +13,7 @@ from slam.frontend.seen_space import SeenSpace
 from slam.replay import Track
 from slam.system import Raster
 
+pytestmark = pytest.mark.film
 CELL = 0.05
 SPEC = LaserSpec(n_beams=9, angle_min=-1.0, angle_increment=0.25)
 

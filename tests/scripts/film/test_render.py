@@ -30,6 +30,7 @@ from slam.frames import BeamClass, BeamLabels, Frame, LaserSpec, Odometry, Scan
 from slam.logs.carmen import write_carmen
 from tests.pictures import pictures_at
 
+pytestmark = pytest.mark.film
 SETTINGS = {"scene": "arena", "seconds": 2.0, "dynamism": 1.0, "seed": 3}
 
 

@@ -13,11 +13,9 @@ from scripts.integrity.counting import (
     binned,
     most_of_time,
     most_of_trials,
-    pooled,
     stretches,
 )
 from scripts.metrics.judged import Judged
-from slam.errors import InvalidValueError
 from slam.trajectory import Trajectory
 
 HZ = 10.0
@@ -41,17 +39,13 @@ def test_each_scan_has_its_place_in_the_diagram():
         off=[0.01, 0.2, 0.2, 0.6, 0.6, 0.6],
         trusted=[1, 1, 1, 1, 1, 0],
         told=[0, 0, 1, 0, 1, 1],
+        level=[0.4, 0.4, 0.7, 0.4, 0.7, 0.2],
     )
     assert run.misleading().tolist() == [False, True, False, False, False, False]
     assert run.hazardous().tolist() == [False, False, False, True, True, False]
     assert run.right().tolist() == [True, True, True, False, False, False]
     assert run.right(0.1).tolist() == [True] + 5 * [False]
-
-
-def test_who_heeds_the_protection_level_drives_less_and_meets_less():
-    run = moments(off=[0.1, 0.6, 0.6, 0.6], trusted=[1, 1, 1, 0], level=[0.6, 0.4, 0.7, 0.2])
-    assert run.protected().tolist() == [False, True, False, False]
-    assert (run.protected() & run.hazardous()).tolist() == [False, True, False, False]
+    assert run.protected().tolist() == [True, True, False, True, False, False]
 
 
 def test_the_protection_level_is_three_deviations_in_the_worst_direction():
@@ -99,39 +93,25 @@ def test_outages_follow_each_other():
     off[58:] = 0.7
     assert moments(off, trusted).outages()[2] == math.inf
     assert moments(np.zeros(60)).outages() == []
-
-
-def test_runs_of_true_are_counted():
     assert stretches(np.array([1, 1, 0, 1, 0, 0, 1], bool)) == 3
-    assert stretches(np.zeros(4, bool)) == stretches(np.zeros(0, bool)) == 0
+    assert stretches(np.zeros(0, bool)) == 0
 
 
-@pytest.mark.parametrize(("hits", "n"), [(0, 10), (0, 1000), (3, 50), (49, 50)])
-def test_the_bound_of_a_share_inverts_the_binomial(hits, n):
-    most = most_of_trials(hits, n)
-    assert scipy.stats.binom.cdf(hits, n, most) == pytest.approx(0.05)
-
-
-def test_bounds_at_the_ends():
-    assert most_of_trials(0, 1000) == pytest.approx(3.0 / 1000, rel=0.01)
-    assert most_of_trials(7, 7) == 1.0
-    assert math.isnan(most_of_trials(0, 0))
-    with pytest.raises(InvalidValueError, match="hits must be 0 to 3, got 4"):
-        most_of_trials(4, 3)
-
-
-def test_the_bound_of_a_rate_inverts_the_poisson():
+def test_bounds_invert_the_binomial_and_the_poisson():
+    for hits, n in ((0, 10), (0, 1000), (3, 50), (49, 50)):
+        assert scipy.stats.binom.cdf(hits, n, most_of_trials(hits, n)) == pytest.approx(0.05)
     for events in (0, 1, 12):
         rate = most_of_time(events, 4.0)
         assert scipy.stats.poisson.cdf(events, 4.0 * rate) == pytest.approx(0.05)
+    assert most_of_trials(7, 7) == 1.0
+    assert math.isnan(most_of_trials(0, 0))
     assert math.isnan(most_of_time(0, 0.0))
 
 
 def test_quantiles_of_bins_are_those_of_the_values_to_a_bin():
     rng = np.random.default_rng(1)
     values = np.exp(rng.normal(0.0, 1.0, 20_000))
-    bins = pooled([binned(values[:5000]), binned(values[5000:])])
-    assert sum(bins.values()) == len(values)
+    bins = [binned(values[:5000]), binned(values[5000:])]
     for share in (0.5, 0.99, 0.999):
         assert bin_quantile(bins, share) == pytest.approx(np.quantile(values, share), rel=0.045)
-    assert math.isnan(bin_quantile({}, 0.5))
+    assert math.isnan(bin_quantile([], 0.5))

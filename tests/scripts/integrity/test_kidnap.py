@@ -2,7 +2,6 @@
 """A carried robot and a pushed SLAM, on streams made by hand."""
 
 import math
-from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -10,7 +9,6 @@ import pytest
 from scripts.integrity import kidnap
 from slam import se2
 from slam.frames import Frame
-from slam.frontend.odometry_steps import thinned
 from tests.world2d import Drive, World2D, arena, frames, laser
 
 
@@ -18,16 +16,6 @@ from tests.world2d import Drive, World2D, arena, frames, laser
 def stream() -> list[Frame]:
     drive = Drive((1.0, 0.5, 0.3), ((0.4, 0.8, 8.0),))
     return frames(World2D(arena()), drive, rate_hz=10.0, spec=laser(61), seed=4)
-
-
-def test_thinned_frames_state_the_covariance_of_all_the_motion_between_them(stream):
-    thin = thinned(stream, 4)
-    assert [f.stamp_ns for f in thin] == [f.stamp_ns for f in stream[::4]]
-    parts = [f.odometry.increment_covariance for f in stream]
-    np.testing.assert_array_equal(thin[2].odometry.increment_covariance, np.sum(parts[5:9], axis=0))
-    bare = [replace(f, odometry=replace(f.odometry, increment_covariance=None)) for f in stream]
-    assert thinned(bare, 4)[2].odometry.increment_covariance is None
-    assert [f.scan for f in thinned(stream, 1)] == [f.scan for f in stream]
 
 
 def test_a_kidnap_is_far_near_the_map_and_unknown_to_the_odometry(stream):

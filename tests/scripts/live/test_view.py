@@ -22,6 +22,7 @@ from sim.view.moment import Moments
 from slam.replay import Replay, systems_named
 from tests.scripts.report.browser import CHROMIUM, Browser
 
+pytestmark = pytest.mark.film
 LOOPBACK = ("127.0.0.1", 0)
 OPENER = Opener(slams=["odometry"], settings={"scene": "arena", "dynamism": 0.0}, seconds=600.0)
 LIMIT_S = 120.0

@@ -12,6 +12,7 @@ from scripts.cli import app
 from sim.simulation import stream
 from slam.logs import open_log, write_carmen
 
+pytestmark = pytest.mark.slow
 SCANNER = "scanner(fov_deg=180, beams=181, rate_hz=5, sigma_m=0.005)"
 
 

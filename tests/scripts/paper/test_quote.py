@@ -13,6 +13,7 @@ from scripts.paper.report import TABLE_3, Report, new_figure, paper_table
 from scripts.paper.runs import Plan
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.docs
 ROOT = Path(__file__).parents[3]
 
 

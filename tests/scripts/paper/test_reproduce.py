@@ -19,6 +19,7 @@ from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.logs.victoria_graph import read_graph, stamped
 from slam.logs.victoria_park import read_victoria_park, twist_of
 
+pytestmark = pytest.mark.slow
 DT = 0.025
 
 

@@ -8,6 +8,7 @@ import pytest
 
 from scripts.report.answer import Level, Lost, Standing, answer, controls, failed, standing
 
+pytestmark = pytest.mark.film
 MINE, ORACLE = "my_icp", "oracle(shunting)"
 
 

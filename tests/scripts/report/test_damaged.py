@@ -19,6 +19,8 @@ from sim.recording.sums import write_sums
 from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made
 
+pytestmark = pytest.mark.film
+
 # What ``verify`` wants to be there, and no report reads.
 UNREAD = (
     "runs.json", "drive/runs.csv", "drive/runs.json", "drive/goals.csv", "drive/closed_loop.png",

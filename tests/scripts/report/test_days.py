@@ -12,6 +12,8 @@ from scripts.report.study import study
 from slam.errors import LogFormatError
 from tests.scripts.report import made
 
+pytestmark = pytest.mark.film
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -22,6 +22,8 @@ from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made
 from tests.scripts.report.browser import CHROMIUM, Browser
 
+pytestmark = pytest.mark.film
+
 
 @pytest.fixture(scope="module")
 def folder(tmp_path_factory: pytest.TempPathFactory) -> Path:

@@ -30,6 +30,7 @@ from tests.scripts.robustness.samples import (
     missed_by_verify,
 )
 
+pytestmark = pytest.mark.fuzz
 EPISODES = ["arena-d0.5-s0000", "arena-d0.5-s0001"]
 
 

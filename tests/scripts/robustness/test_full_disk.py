@@ -24,6 +24,7 @@ from slam.shunting import ShuntingSlam
 from slam.system import Raster
 from tests.processes import python
 
+pytestmark = pytest.mark.fuzz
 FULL = "No space left on device"
 Disk = Callable[[int], Path]
 

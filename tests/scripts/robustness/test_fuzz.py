@@ -16,6 +16,7 @@ from slam.frames import Features, Frame, LaserSpec, Odometry, Scan
 from slam.system import create
 from tests.processes import python
 
+pytestmark = pytest.mark.fuzz
 Rng = np.random.Generator
 
 

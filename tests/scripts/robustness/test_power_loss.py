@@ -20,6 +20,7 @@ from slam.maps import write_map
 from slam.shunting import ShuntingSlam
 from slam.system import Raster
 
+pytestmark = pytest.mark.fuzz
 Calls = list[tuple[str, str]]
 
 

@@ -12,6 +12,7 @@ from slam.files import write_text
 from slam.logs import write_carmen
 from tests.processes import python
 
+pytestmark = pytest.mark.slow
 LOCALES = [
     {"PYTHONIOENCODING": "ascii"},
     {"LC_ALL": "C", "PYTHONCOERCECLOCALE": "0", "PYTHONUTF8": "0"},

@@ -16,6 +16,7 @@ from slam.maps import read_map
 from slam.trajectory import read_tum
 from tests.processes import python
 
+pytestmark = pytest.mark.slow
 REPO = Path(__file__).resolve().parents[3]
 
 

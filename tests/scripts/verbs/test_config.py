@@ -17,6 +17,8 @@ from slam import config_of
 from slam.set_numbers import with_set
 from tests.processes import python
 
+pytestmark = pytest.mark.slow
+
 
 def numbers(capsys: pytest.CaptureFixture[str], what: str, group: str = "") -> list[dict]:
     config(what, group, as_json=True)

@@ -13,6 +13,8 @@ import pytest
 from scripts.doctor import checks
 from sim.view import gl
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture
 def installed(monkeypatch: pytest.MonkeyPatch) -> dict[str, str]:

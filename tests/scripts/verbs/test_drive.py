@@ -13,6 +13,7 @@ from scripts.closed_loop.runs import DrivenRun, load, run_one
 from scripts.verbs.drive import _seeds
 from sim.loop import LoopConfig
 
+pytestmark = pytest.mark.slow
 SHORT = {"goals": 1, "loop": LoopConfig(limit_s=1.0)}
 FILES = ("goals.csv", "runs.csv", "levels.csv", "runs.json", "closed_loop.png", "paths.png")
 

@@ -33,6 +33,7 @@ from slam.ros.template import EPOCH_NS
 from slam.trajectory import read_tum
 from tests.processes import python
 
+pytestmark = pytest.mark.slow
 REPO = Path(__file__).resolve().parents[3]
 SETTINGS = {"episodes": 3, "seconds": 1.5, "seed": 1}
 NAMES = [f"arena-d0.5-s000{k}" for k in (1, 2, 3)]

@@ -28,6 +28,7 @@ from slam.logs import write_carmen
 from slam.logs.bag_topics import Bag
 from slam.maps import read_map
 
+pytestmark = pytest.mark.slow
 REFUSED = "is what this command reads: write to another place"
 Words = list[str | Path]
 

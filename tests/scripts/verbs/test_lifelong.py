@@ -14,6 +14,8 @@ from slam.days.history import History
 from slam.errors import InvalidValueError
 from slam.frames import Stream, StreamMetadata
 
+pytestmark = pytest.mark.slow
+
 
 def test_the_time_of_a_session_is_given_or_the_logs_own():
     stream = Stream(

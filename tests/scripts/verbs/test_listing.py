@@ -10,6 +10,8 @@ from scenes import registry
 from scripts.verbs import listing
 from slam import system
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize("terminal", [True, False])
 def test_nothing_is_cut_and_nothing_is_marked_up(monkeypatch, terminal: bool):

@@ -11,6 +11,8 @@ from scripts.live.session import Opener
 from scripts.verbs.live import _serve
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
+
 
 def test_without_viser_it_says_what_to_install(called, monkeypatch):
     monkeypatch.setitem(sys.modules, "viser", None)

@@ -12,6 +12,7 @@ from typer.testing import CliRunner
 from scripts.cli import app
 from slam.errors import LogFormatError
 
+pytestmark = pytest.mark.slow
 ROVER = """
 [time]
 column = 1

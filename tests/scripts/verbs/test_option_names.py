@@ -10,6 +10,8 @@ from typer.main import get_command
 from scripts.cli import app
 from scripts.option_names import OPTIONS_OF, by_option, flowing
 
+pytestmark = pytest.mark.slow
+
 
 def test_other_words_stay_as_they_are():
     options = ("--seconds", "--dynamism")

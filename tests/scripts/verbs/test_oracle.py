@@ -6,9 +6,13 @@ from collections.abc import Callable
 from pathlib import Path
 from types import SimpleNamespace
 
+import pytest
+
 from scripts.debugger.recording import Case, Checkpoint, record
 from sim.simulation import stream
 from slam.logs.carmen import write_carmen
+
+pytestmark = pytest.mark.slow
 
 
 def test_a_run_has_the_oracle_beside_the_slam(

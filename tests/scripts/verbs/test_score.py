@@ -16,6 +16,7 @@ from slam.ros.recorded import read_statements
 from slam.ros.template import EPOCH_NS, STORE
 from tests.slam.ros.frames import SPEC, driven
 
+pytestmark = pytest.mark.slow
 FRAMES = driven(60)
 HOUR_NS = 3600 * 10**9
 

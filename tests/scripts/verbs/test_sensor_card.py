@@ -20,6 +20,8 @@ from sim.sensors.lidar.sheet import NOT_STATED, sheet_of
 from slam.errors import MobiliaError
 from slam.evaluation.scanner.card import ScannerCard, measure
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.mark.parametrize(
     ("part", "count"),

@@ -15,6 +15,7 @@ from sim.recording.verify import check_hashes, regenerate
 from slam.errors import InvalidValueError
 from slam.logs.bag_topics import Bag
 
+pytestmark = pytest.mark.slow
 REPO = Path(__file__).resolve().parents[3]
 N, CHANGE = 3, 0.4
 NAMES = [f"office-d0.3-c0.4-s0002-session{k:02d}" for k in range(N)]

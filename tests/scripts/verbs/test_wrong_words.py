@@ -6,6 +6,7 @@ from pathlib import Path
 
 import pytest
 
+pytestmark = pytest.mark.slow
 WITHOUT_OUT = ("config", "live", "render", "report")
 
 WRONG = [

@@ -11,6 +11,8 @@ from sim.core.dynamism import Dynamism
 from sim.core.flow import clearance_at
 from sim.world.world import SUBSTEPS_PER_S, World
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def walk() -> dict[str, np.ndarray | World]:

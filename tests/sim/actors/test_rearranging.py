@@ -15,6 +15,7 @@ from sim.twins.absence import Change, apply
 from sim.twins.twins import TWINS, Twins
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
 SCENES, SHARES = ("arena", "office", "classroom"), (0.25, 0.5, 0.75, 1.0)
 
 

@@ -13,6 +13,7 @@ from sim.simulation import Simulation, tour
 from sim.world.world import SUBSTEPS_PER_S, World
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
 CALM = Dynamism(stay_mean=4.0)  # people walk, nothing is shoved
 STEP = 30  # substeps from one sample to the next: 0.1 s
 

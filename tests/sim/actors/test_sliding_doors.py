@@ -22,6 +22,7 @@ from sim.view.mapview import MapView
 from sim.world.world import World
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
 OPEN_M, SHUT_M = 1.2, 0.05  # m: stands open, is shut
 PLAN = """
 <mujoco><worldbody>

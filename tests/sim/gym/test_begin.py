@@ -10,6 +10,8 @@ from gymnasium.utils.env_checker import data_equivalence
 from sim.gym import env as environment
 from sim.gym.env import MobiliaEnv
 
+pytestmark = pytest.mark.slow
+
 
 class Later(ThreadPoolExecutor):
     """Runs nothing until ``now``."""

@@ -13,6 +13,7 @@ from sim.gym.env import MobiliaEnv
 from sim.view import gl
 from slam.errors import InvalidValueError, MobiliaError
 
+pytestmark = pytest.mark.slow
 IDS = ("mobilia/Arena-v2", "mobilia/Office-v2")
 
 
@@ -76,6 +77,7 @@ def test_a_hard_collision_ends_the_episode_only_when_asked():
     assert crash() is False
 
 
+@pytest.mark.film
 @pytest.mark.skipif(gl.find().backend is None, reason="NO OpenGL HERE: 3D pictures not tested")
 def test_the_cameras_see_a_room():
     for view in ("top", "follow", "persp"):

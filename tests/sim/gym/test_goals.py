@@ -17,6 +17,8 @@ from sim.world.kidnapping import hull_discs
 from slam import se2
 from slam.errors import InvalidValueError, MobiliaError
 
+pytestmark = pytest.mark.slow
+
 
 def make(id_="mobilia/Arena-v2", **settings):
     return gymnasium.make(id_, disable_env_checker=True, **settings).unwrapped

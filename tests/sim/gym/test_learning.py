@@ -10,6 +10,7 @@ import sim  # noqa: F401  (registers the environments)
 from sim.gym.wrappers import goal_rooms
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
 ID = "mobilia/ArenaGoal-v2"
 
 

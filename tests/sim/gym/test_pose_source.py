@@ -12,6 +12,7 @@ from slam import create, se2
 from slam.errors import InvalidValueError, SlamFailedError, UnknownNameError
 from slam.odometry import OdometrySlam
 
+pytestmark = pytest.mark.slow
 GOAL = (3.0, 2.0)
 ENTRY = "slam.odometry:OdometrySlam"
 

@@ -12,6 +12,7 @@ import sim  # noqa: F401  (registers the environments)
 from sim.gym.vector import MobiliaVectorEnv
 from slam.errors import InvalidValueError, MobiliaError
 
+pytestmark = pytest.mark.slow
 N, STEPS = 3, 14
 SETTINGS = {"time_limit_s": 0.25, "dynamism": 0.8}
 

@@ -19,6 +19,7 @@ from sim.gym.vector import MobiliaVectorEnv
 from sim.gym.workers import RoomsEndedError
 from slam.errors import InvalidValueError, MobiliaError
 
+pytestmark = pytest.mark.slow
 SHORT = {"scene": "arena", "time_limit_s": 0.15, "goal": "random"}
 STILL = np.zeros((2, 2))
 ORPHANED = """

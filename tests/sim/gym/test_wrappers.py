@@ -10,6 +10,7 @@ import sim  # noqa: F401  (registers the environments)
 from sim.gym import wrappers
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
 SETTINGS = {"goal": "random", "frame_skip": 2}
 
 

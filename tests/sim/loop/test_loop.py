@@ -15,6 +15,7 @@ from slam import Estimate, create, se2
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.odometry import OdometrySlam
 
+pytestmark = pytest.mark.slow
 NEAR = ["north_east"]
 
 

@@ -5,11 +5,13 @@ left the view is remembered for a while."""
 import math
 
 import numpy as np
+import pytest
 
 from sim.loop.sight import MEMORY_S, THIN_RADIUS_M, WIDE_RADIUS_M, Sight
 from slam.frames import LaserSpec, to_ns
 from tests.world2d import frame_at
 
+pytestmark = pytest.mark.slow
 SPEC = LaserSpec(n_beams=361, angle_min=-math.pi / 2, angle_increment=math.pi / 360, range_max=20.0)
 POST = slice(178, 183)  # 2.5 degrees straight ahead: 4 to 7 cm at 1 to 1.6 m
 

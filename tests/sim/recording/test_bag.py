@@ -31,6 +31,7 @@ from slam.ros.messages import turns_of
 from slam.ros.template import EPOCH_NS
 from slam.trajectory import read_tum
 
+pytestmark = pytest.mark.slow
 CUBE, CYLINDER = 1, 3  # of visualization_msgs/Marker
 
 

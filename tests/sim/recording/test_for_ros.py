@@ -36,6 +36,7 @@ from slam.logs.bag_laser import mounting
 from slam.ros.template import EPOCH_NS
 from slam.trajectory import Trajectory, read_tum, write_tum
 
+pytestmark = pytest.mark.slow
 REPO = Path(__file__).resolve().parents[3]
 
 

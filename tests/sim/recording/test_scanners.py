@@ -19,6 +19,7 @@ from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.logs import open_log, read_bag
 from slam.logs.carmen import write_carmen
 
+pytestmark = pytest.mark.slow
 NAMES = ("utm30lx", "tim561", "rplidar_a1", "scanner(fov_deg=360,beams=500,rate_hz=33,sigma_m=0)")
 
 

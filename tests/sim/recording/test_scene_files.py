@@ -13,6 +13,7 @@ from sim.world.robots import FOLDER
 from slam.errors import LogFormatError
 from slam.names import NameFromFile
 
+pytestmark = pytest.mark.slow
 LAB = """
 walls = [[[0, 0], [5, 0], [5, 4], [0, 4], [0, 0]]]
 start = [1, 1, 90]

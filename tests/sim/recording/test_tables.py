@@ -4,9 +4,12 @@
 import csv
 from pathlib import Path
 
+import pytest
+
 from sim.actors.rearranging import FAR_M, Rearrangement
 from sim.recording.tables import COLUMNS, write_rearranged
 
+pytestmark = pytest.mark.slow
 BOUNDS = (0.0, 0.0, 8.0, 6.0)
 
 

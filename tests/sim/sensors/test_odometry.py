@@ -13,6 +13,7 @@ from slam import se2
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import Odometry
 
+pytestmark = pytest.mark.slow
 TRACK = 0.33
 Float = NDArray[np.float64]
 

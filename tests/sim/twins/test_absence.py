@@ -10,6 +10,7 @@ from sim.simulation import Simulation
 from sim.twins.absence import Change, apply
 from slam.errors import InvalidValueError, UnknownNameError
 
+pytestmark = pytest.mark.slow
 ROOM = {"scene": "arena", "seed": 3, "n_chairs": 6, "n_people": 1, "labels": True}
 
 

@@ -11,6 +11,7 @@ from sim.twins.absence import Change, apply
 from sim.twins.room import _Shapes
 from slam.errors import UnknownNameError
 
+pytestmark = pytest.mark.slow
 CROWD = "escorts:3,groups:4,boards:1,trains:1,couches:1,cleaners:1"
 ROOM = {"scene": "arena", "seed": 3, "n_chairs": 4, "n_people": 0, "labels": True,
         "dynamism": 0.6, "change": 0.0, "crowd": CROWD, "walls": "visible"}  # fmt: skip

@@ -8,6 +8,7 @@ import pytest
 
 from sim.twins.log import laid
 
+pytestmark = pytest.mark.slow
 ANGLES = np.radians(np.arange(-60.0, 61.0))
 LASERS = np.array([[0.0, 0.1 * k, 0.0] for k in range(-5, 6)])
 

@@ -15,6 +15,8 @@ from sim.world.world import SUBSTEPS_PER_S, World
 from slam.errors import InvalidValueError
 from slam.frames import BeamClass
 
+pytestmark = pytest.mark.slow
+
 
 @pytest.fixture(scope="module")
 def trio():

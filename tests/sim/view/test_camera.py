@@ -17,6 +17,8 @@ from slam.errors import InvalidValueError, MissingDependencyError
 from tests.built_scenes import placed
 from tests.processes import python
 
+pytestmark = pytest.mark.film
+
 
 @pytest.fixture(scope="module")
 def world():

@@ -6,6 +6,8 @@ import pytest
 
 from sim.view import draw
 
+pytestmark = pytest.mark.film
+
 
 @pytest.mark.parametrize("x", [-500, -20, 0, 30, 100])
 def test_what_lies_outside_is_cut_off(x):

@@ -13,6 +13,8 @@ from sim.view.scans import beam_ends
 from slam.errors import InvalidValueError
 from slam.frames import Frame, LaserSpec, Odometry, Scan
 
+pytestmark = pytest.mark.film
+
 
 @pytest.fixture(scope="module")
 def office():

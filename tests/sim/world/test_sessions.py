@@ -16,6 +16,7 @@ from sim.world.times_of_day import DAY, MOST_SESSIONS, time_of
 from sim.world.world import World
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
 ALL = ("apartment", "arena", "classroom", "corridor", "office", "random-rooms", "warehouse")
 
 

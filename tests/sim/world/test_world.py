@@ -16,6 +16,7 @@ from sim.world.world import SUBSTEPS_PER_S, World
 from slam import se2
 from slam.errors import InvalidValueError
 
+pytestmark = pytest.mark.slow
 STILL = Dynamism.at(0)
 
 

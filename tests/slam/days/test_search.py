@@ -16,6 +16,7 @@ from slam.tracker.belief.places import Place
 from slam.tracker.matching.matcher import unmatched
 from tests.world2d import Drive, World2D, frames, laser, rectangle, wander
 
+pytestmark = pytest.mark.slow
 CONFIG = ShuntingConfig(cell_m=0.05, trace_s=2.5)
 HALL = rectangle(-4.0, -3.0, 4.0, 3.0)
 NICHE = rectangle(2.0, -3.0, 4.0, -2.0)

@@ -18,6 +18,7 @@ from slam.tracker import map_file
 from tests.slam.tracker.test_map_file import rewritten
 from tests.world2d import Drive, World2D, frames, laser, rectangle, wander
 
+pytestmark = pytest.mark.slow
 WALLS = np.vstack([rectangle(-4.0, -3.0, 4.0, 3.0), rectangle(-2.0, 1.0, -1.2, 2.2)])
 HOME = World2D(np.vstack([WALLS, rectangle(2.0, -3.0, 4.0, -2.0)]))
 ELSEWHERE = World2D(np.vstack([rectangle(-1.5, -1.0, 7.0, 1.0), rectangle(3.0, 0.2, 3.6, 0.7)]))

@@ -24,6 +24,8 @@ from slam.frames import Features
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import world2d
 
+pytestmark = pytest.mark.slow
+
 
 def run(system: EkfSlam, frames: Iterable[Frame]) -> tuple[np.ndarray, np.ndarray]:
     """Errors (n, 3) and NEES (n - 1,)."""

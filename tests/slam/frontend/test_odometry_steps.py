@@ -16,7 +16,7 @@ from slam.evaluation.points import PointWorld, PointWorldConfig
 from slam.frames import NS_PER_S, Features, Frame, Odometry
 from slam.frontend.heading_bias import HeadingBias
 from slam.frontend.odometry_prior import Prediction, motion
-from slam.frontend.odometry_steps import MotionSum
+from slam.frontend.odometry_steps import MotionSum, thinned
 
 sys.path.insert(0, str(Path(__file__).resolve().parents[2]))
 import world2d
@@ -217,3 +217,16 @@ def test_a_changed_prediction_keeps_nothing_that_was_computed_of_the_one_before(
     assert first.prior == pytest.approx(np.eye(3))
     assert first.changed(carried=2.0 * np.eye(3)).prior == pytest.approx(3.0 * np.eye(3))
     assert first.prior == pytest.approx(np.eye(3))
+
+
+def test_thinned_frames_state_the_covariance_of_all_the_motion_between_them():
+    stream = frames_for("odometry")
+    thin, parts = thinned(stream, 4), [f.odometry.increment_covariance for f in stream]
+    assert [f.stamp_ns for f in thin] == [f.stamp_ns for f in stream[::4]]
+    np.testing.assert_array_equal(thin[2].odometry.increment_covariance, np.sum(parts[5:9], axis=0))
+    bare = [
+        dataclasses.replace(f, odometry=dataclasses.replace(f.odometry, increment_covariance=None))
+        for f in stream
+    ]
+    assert thinned(bare, 4)[2].odometry.increment_covariance is None
+    assert [f.scan for f in thinned(stream, 1)] == [f.scan for f in stream]

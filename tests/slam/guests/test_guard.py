@@ -15,7 +15,10 @@ from slam.guests.wire import MARK as MARK_OF_WORKERS
 from slam.guests.wire import Wire, guarded_workers
 from tests.processes import processes_with
 
-pytestmark = pytest.mark.skipif(sys.platform != "linux", reason="orphans are only found on Linux")
+pytestmark = [
+    pytest.mark.slow,
+    pytest.mark.skipif(sys.platform != "linux", reason="orphans are only found on Linux"),
+]
 
 # Each starts a child that leaves its session and says its number.
 DAEMON = """

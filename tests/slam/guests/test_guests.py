@@ -22,6 +22,7 @@ from slam.guests.genz import quiet
 from slam.replay import Replay, Track
 from tests.world2d import World2D, arena, frames, laser, wander
 
+pytestmark = pytest.mark.slow
 MODULES = {
     "genz-icp": "genz_icp",
     "karto": "karto_scanmatcher",

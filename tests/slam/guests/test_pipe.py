@@ -18,6 +18,7 @@ from slam.replay import Track
 from slam.system import RunsAtTheEnd
 from tests.world2d import World2D, arena, frames, laser, wander
 
+pytestmark = pytest.mark.slow
 CLIENT = Path(__file__).with_name("misbehaving.py")
 
 

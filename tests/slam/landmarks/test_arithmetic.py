@@ -75,6 +75,7 @@ def test_the_update_is_josephs_form(n):
     np.testing.assert_array_equal(ekf.error_covariance, ekf.error_covariance.T)
 
 
+@pytest.mark.slow
 def test_a_thousand_precise_updates_of_a_vague_state_leave_it_positive():
     """1 mm seen from a pose that was lost by 10 m, again and again."""
     ekf = looked_around(15, std=10.0)

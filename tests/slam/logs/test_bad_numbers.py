@@ -19,6 +19,7 @@ from tests.slam.logs.conftest import CarmenText
 from tests.slam.logs.test_centimetre import lines as centimetre_lines
 from tests.slam.logs.test_rover import POSES, RANGES, TICKS
 
+pytestmark = pytest.mark.fuzz
 POSE = [0.1, 0.2, 0.3]
 TEXT = CarmenText()
 

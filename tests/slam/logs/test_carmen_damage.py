@@ -14,6 +14,8 @@ from slam.errors import LogFormatError
 from slam.logs import open_log, read_carmen
 from tests.slam.logs.damaged import FUZZED, edited, edits, frames_or_refused
 
+pytestmark = pytest.mark.fuzz
+
 
 def refuse(path, match):
     with pytest.raises(LogFormatError, match=match) as caught:

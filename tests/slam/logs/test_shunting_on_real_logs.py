@@ -5,12 +5,15 @@ On Intel it is in ``tests/golden``, beside the digest of the same run.
 """
 
 import numpy as np
+import pytest
 
 from slam import create
 from slam.evaluation import metrics
 from slam.logs import open_log
 from slam.replay import Track
 from slam.trajectory import Trajectory
+
+pytestmark = pytest.mark.slow
 
 
 def test_closed_loops_bring_the_museum_within_its_reference(data_folder):

@@ -210,6 +210,7 @@ def test_damaged_matlab_files_are_refused(park, tmp_path):
         open_log(path)
 
 
+@pytest.mark.slow
 def test_the_real_park_is_closed(data_folder):
     """4 km without divergence: GPS lies along the path as it does along the optimised graph."""
     folder = data_folder("victoria_park")

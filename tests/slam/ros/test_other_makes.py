@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Nodes of other makes: Fast DDS in C++ with types of its own generator, zenoh-ros2-sdk."""
 
-import os
 import shlex
 import time
 from dataclasses import replace
@@ -10,8 +9,6 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.live.session import Opener
-from scripts.live.view import Network
 from slam import se2
 from slam.ros import slam as ros2
 from slam.ros.link import Topic
@@ -77,26 +74,6 @@ def test_one_gets_every_field_and_drives_while_another_is_scored(client, tmp_pat
         np.testing.assert_array_equal(ranges, frame.scan.ranges)
         assert len(intensities) == 0
         assert frame_id == b"laser"
-
-
-def test_their_stamped_twists_move_the_robot(client):
-    middleware, words = client
-    session = Opener(slams=["odometry"], settings={"scene": "arena"}, seconds=600.0).open()
-    with on(middleware) as (domain, link):
-        network = Network(link)
-        network.begin(session.static_map, session.scan_height_m)
-        with started([*words, os.devnull, 60, "stamped"], domain) as drives:
-            time.sleep(2.0)
-            for shown in session.run():
-                network.send(shown)
-                time.sleep(1.0 / 37.5)
-                for request in network.requests():
-                    session.hands.do(request)
-                if drives.poll() is not None:
-                    break
-    moved = shown.frame.truth - session.moments.T_world_map
-    assert session.hands.client_drives
-    assert np.hypot(*moved[:2]) > 0.2
 
 
 def test_another_make_is_a_slam(client, monkeypatch):

@@ -22,6 +22,8 @@ from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from slam.trajectory import Trajectory
 
+pytestmark = pytest.mark.slow
+
 
 def network_of(points: np.ndarray, **options: float) -> Network:
     config = ShuntingConfig(cell_m=0.1, **options)

@@ -15,6 +15,8 @@ from slam.replay import Track
 from slam.trajectory import Trajectory
 from tests.world2d import Drive, World2D, arena, frames, office, office_loop
 
+pytestmark = pytest.mark.slow
+
 
 def scanner(
     step_deg: float, fov_deg: float, range_m: float, at: tuple[float, float, float] = (0.1, 0, 0)

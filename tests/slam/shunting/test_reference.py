@@ -18,6 +18,8 @@ from slam.shunting import ShuntingConfig, ShuntingSlam, reference
 from slam.shunting.reference import ACROSS, CELL, Reference
 from tests.world2d import World2D, arena, frames, laser, wander
 
+pytestmark = pytest.mark.slow
+
 # What the preset does beside the paper's equations. With these numbers it does nothing of it.
 EQUATIONS_ALONE = {
     "frontend.bias.per_m": 0.0,  # learnt heading bias of odometry: poses move by 29 mm

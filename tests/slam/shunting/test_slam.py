@@ -37,6 +37,7 @@ def rms(values: Array) -> float:
     return float(np.sqrt((values * values).sum(axis=-1).mean()))
 
 
+@pytest.mark.slow
 @pytest.mark.parametrize("rate_hz", [5.0, 37.5])
 def test_a_known_motion_is_recovered(rate_hz: float) -> None:
     spec = laser(361, interlaced=True)

@@ -17,6 +17,7 @@ from slam.evaluation.scanner.walls import walls
 from slam.frames import Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata, to_ns
 from tests.world2d import frame_at
 
+pytestmark = pytest.mark.slow
 SPEC = LaserSpec(n_beams=181, angle_min=-math.pi / 2, angle_increment=math.radians(1.0))
 ROOM = ((-4.0, -2.5), (5.0, -2.5), (5.0, 3.5), (-4.0, 3.5))
 PILLAR = ((2.0, -0.3), (2.0, 0.5), (2.2, 0.5), (2.2, -0.3))

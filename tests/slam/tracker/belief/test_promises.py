@@ -39,6 +39,7 @@ from tests.slam.tracker.belief.drives import (
 )
 from tests.world2d import Chairs, Drive, World2D, arena, frames, going_on, rectangle, wander
 
+pytestmark = pytest.mark.slow
 PLACE = (2.0, -2.0, 2.0)
 MIRRORED = (-3.5, -2.8, 0.4)  # half a turn about the middle of the room shows nearly the same
 NEAR_WALL = (-2.6, 1.5, 2.2)  # which stands before all that the map shows where motion led

@@ -22,6 +22,7 @@ from slam.tracker.tracking.loops import Loops
 from slam.tracker.tracking.redraw import Redrawing
 from tests.world2d import Drive, World2D, frames, laser, office, office_loop, rectangle
 
+pytestmark = pytest.mark.slow
 Found = Generator[None, None, Edge | None]
 CONFIG = ShuntingConfig().changed({"cell_m": 0.05, "loops.long_m": 50.0})
 

@@ -96,6 +96,7 @@ def test_a_map_that_is_not_moved_keeps_all_key_frames(monkeypatch: pytest.Monkey
     assert slam._loops._stand == list(range(len(slam._loops.keys)))
 
 
+@pytest.mark.slow
 def test_round_and_round_the_graph_stops_growing(monkeypatch: pytest.MonkeyPatch) -> None:
     """Four times round an office: all poses are kept, and are as good as with all key frames."""
     once = office_loop()
