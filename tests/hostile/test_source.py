@@ -50,8 +50,6 @@ STARTERS = {
     "slam/guests/wire.py": "a guard of ours; below it pipe:COMMAND, not of names from files",
     "sim/gym/workers.py": "our own Python, which steps some of the rooms",
     "sim/view/gl.py": "our own Python, without the working folder",
-    "scripts/benches/ros2.py": "our own Python, as the other end of a link",
-    "scripts/benches/shares.py": "perf and nm, on ourselves",
     "scripts/film/encode.py": "ffmpeg",
     "scripts/experiments/real_logs.py": "our own Python in each checkout, and git",
     "scripts/result_files.py": "git, for the commit of a results file",
