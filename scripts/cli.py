@@ -5,13 +5,13 @@ import logging
 import os
 import sys
 from importlib import import_module, metadata
-from typing import Annotated
 
 import typer
 
 from scripts import interrupt
 from scripts.console import COMPILER, LogLines, console, fail, note
 from scripts.option_names import Verb
+from scripts.spec import command, option, spec
 from scripts.verbs.scene import scene
 from slam.errors import InvalidValueError, MissingPathError, MobiliaError, UnknownNameError
 from slam.names import load, look_in
@@ -30,15 +30,16 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-# Each is a function of that name in a module of that name, but for the name of a built-in type.
+# Each is ``Name`` in ``scripts.verbs.name``; ``list`` would hide the built-in type.
 VERBS = (
     "demo", "run", "render", "generate", "verify", "export", "list", "config", "bench", "doctor",
     "sensor-card", "reproduce", "compare", "benchmark", "drive", "blame", "live", "report",
     "lifelong", "twin", "score",
 )  # fmt: skip
 for _name in VERBS:
-    _own = {"list": "listing"}.get(_name, _name.replace("-", "_"))
-    app.command(_name, cls=Verb)(getattr(import_module(f"scripts.verbs.{_own}"), _own))
+    _own = {"list": "listing"}.get(_name, _name).replace("-", "_")
+    _spec = getattr(import_module(f"scripts.verbs.{_own}"), _own.title().replace("_", ""))
+    app.command(_name, cls=Verb)(command(_spec))
 
 app.add_typer(scene, name="scene")
 
@@ -49,32 +50,32 @@ def _version(asked: bool) -> None:
         raise typer.Exit
 
 
-@app.callback()
-def options(
-    verbose: bool = typer.Option(False, "--verbose", "-v", help="Also print what is going on."),
-    version: Annotated[
-        bool,
-        typer.Option(
-            "--version", help="Print the version and end.", callback=_version, is_eager=True
-        ),
-    ] = False,
-    modules: Annotated[
-        list[str] | None,
-        typer.Option(
-            "--with",
-            help="Import this Python module of yours first, so that the scene, scanner, SLAM, "
-            "topic or film pane that it registers is known.",
-        ),
-    ] = None,
-) -> None:
+@spec
+class Everywhere:
     """Options of every verb."""
-    logging.basicConfig(
-        level=logging.INFO if verbose else logging.WARNING,
-        format="%(message)s",
-        handlers=[LogLines(console=console, show_path=False, show_time=False)],
+
+    verbose: bool = option("Also print what is going on.", False, "--verbose", "-v")
+    version: bool = option(
+        "Print the version and end.", False, "--version", callback=_version, is_eager=True
     )
-    logging.getLogger(COMPILER).setLevel(logging.INFO)  # what nothing else is said of for long
-    load(modules or ())
+    modules: list[str] | None = option(
+        "Import this Python module of yours first, so that the scene, scanner, SLAM, topic or film "
+        "pane that it registers is known.",
+        None,
+        "--with",
+    )
+
+    def __call__(self) -> None:
+        logging.basicConfig(
+            level=logging.INFO if self.verbose else logging.WARNING,
+            format="%(message)s",
+            handlers=[LogLines(console=console, show_path=False, show_time=False)],
+        )
+        logging.getLogger(COMPILER).setLevel(logging.INFO)  # what nothing else is said of for long
+        load(self.modules or ())
+
+
+app.callback()(command(Everywhere))
 
 
 def main(warning: str | None = None) -> None:

@@ -15,15 +15,15 @@ DATASET = "dataset.json"  # the plan that ``generate`` writes (``sim.recording.d
 LOGS = (".gz", ".xz", ".log", ".clf", ".txt", ".mat", ".bag", ".mcap", ".db3", ".npz")
 
 
-def check(slams: Sequence[str], *scenes: str | None) -> None:
-    """``UnknownNameError`` for a SLAM or a scene of no such name; None is no scene.
+def check(slams: Sequence[str | None], *scenes: str | None) -> None:
+    """``UnknownNameError`` for a SLAM or a scene of no such name; None is none.
 
     Names of code (``module:Class``) are resolved later, where they are used.
     """
     for scene in scenes:
         if scene is not None:
             registry.check_name(scene)
-    for slam in slams:
+    for slam in filter(None, slams):
         system.check_name(slam)
         if inside(slam).partition(":")[0] in ("ros2", "ros2-zenoh"):
             note(f"{slam} is a node of ROS 2: its results do not repeat to the byte")

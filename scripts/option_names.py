@@ -1,53 +1,24 @@
 # SPDX-License-Identifier: Apache-2.0
-"""How a command line is read: lists, names that a shell completes, errors that name options."""
+"""How a command line is read: lists of words, errors that name options, what is read only."""
 
 import os
 import re
 from collections.abc import Mapping, Sequence
-from importlib import import_module
 from pathlib import Path
 from typing import Any
 
 from typer.core import TyperCommand
 
+from scripts.spec import Option
 from slam import inputs
 from slam.errors import InvalidValueError
 
 WORDS = "mobilia.words"  # of the command line, in a context
-# Fields that are called otherwise than their option; of several the first that the verb has.
-OPTIONS_OF: dict[str, tuple[str, ...]] = {
-    "Plan.slams": ("--slam",),
-    "Plan.scenes": ("--scene", "scene"),
-    "Plan.levels": ("--dynamism",),
-    "Plan.dynamisms": ("--dynamism",),
-    "Limits.scan_s": ("--scan-limit",),
-    "LoopConfig.limit_s": ("--seconds",),
-    "LoopConfig.scans": ("--every",),
-    "Rule.threshold_m": ("--threshold",),
-    "Rule.within_s": ("--within",),
-    "Question.lead_s": ("--lead",),
-    "Question.horizon_s": ("--horizon",),
-    "Question.at_s": ("--at",),
-    "scan_height_m": ("--scan-height",),
-}
-# Whose fields are filled from options of their own name, else.
+# Whose fields are filled from options of their own name, where the options do not say otherwise.
 _FILLED = ("Recipe", "Plan", "LoopConfig", "Limits", "Rule", "Question", "Pace", "Dynamism",
            "Seeds", "Simulation", "World")  # fmt: skip
 _FIELD = re.compile(rf"\b({'|'.join(_FILLED)})\.([a-z_]+)\b")
 _FIRST = re.compile(r"^([a-z_]+)(?= must )")
-
-
-# What a shell offers for an argument or option of that name.
-COMPLETED: dict[str, tuple[str, ...]] = {
-    "scene": ("scenes.registry:names",), "slam": ("slam.system:names",),
-    "subject": ("slam.system:names",), "oracle": ("slam.system:names",),
-    "scanner": ("sim.sensors.lidar.registry:names",),
-    "tracks": ("scripts.benchmark.tracks:TRACKS",),
-    "what": ("slam.system:names", "sim.sensors.lidar.registry:names"),
-}  # fmt: skip
-
-
-WRITTEN = ("out", "strip_to", "replay", "page", "map_out")  # options that say where to
 
 
 class Verb(TyperCommand):
@@ -58,9 +29,7 @@ class Verb(TyperCommand):
     def __init__(self, *args: Any, **kwargs: Any) -> None:
         super().__init__(*args, **kwargs)
         self.help = flowing(self.help or "")
-        for parameter in self.params:
-            if parameter.name in COMPLETED:
-                parameter._custom_shell_complete = completed
+        self.options: Sequence[Option] = getattr(self.callback, "options", ())
 
     def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
         """Repeat each list option before every one of its words."""
@@ -91,34 +60,27 @@ class Verb(TyperCommand):
                 self._note_inputs(ctx.params)
                 return super().invoke(ctx)
         except InvalidValueError as error:
-            said = by_option(str(error), [name for one in self.params for name in one.opts])
+            typed = {one.name: one.opts for one in self.params}
+            fills = {field: typed[one.name][0] for one in self.options for field in one.fills}
+            said = by_option(str(error), [name for opts in typed.values() for name in opts], fills)
             if said == str(error):
                 raise
             raise InvalidValueError(said) from error
 
     def _note_inputs(self, given: Mapping[str, Any]) -> None:
         """A scene's name, say, that a folder happens to have, is not that folder."""
-        words = [
-            (name, Path(word))
-            for name, value in given.items()
-            for word in (value if isinstance(value, (list, tuple)) else [value])
-            if isinstance(word, (str, Path)) and str(word)
-        ]
-        for name, path in words:
-            if name not in WRITTEN and not (name in COMPLETED and os.path.isdir(path)):
-                inputs.note(path)
-        inputs.refuse(*(path for name, path in words if name in WRITTEN))
-
-
-def completed(_ctx: Any, parameter: Any, incomplete: str) -> list[str]:
-    """Names that go on as the last word of a list with commas begins."""
-    before, comma, begun = incomplete.rpartition(",")
-    names: list[str] = []
-    for where in COMPLETED[parameter.name]:
-        module, _, attribute = where.partition(":")
-        known = getattr(import_module(module), attribute)
-        names += known() if callable(known) else known
-    return [before + comma + name for name in names if name.startswith(begun)]
+        written = []
+        about = {one.name: one for one in self.options}
+        for name, value in given.items():
+            option = about.get(name, Option())
+            for word in value if isinstance(value, (list, tuple)) else [value]:
+                if not isinstance(word, (str, Path)) or not str(word):
+                    continue
+                if option.writes:
+                    written.append(Path(word))
+                elif not (option.complete and os.path.isdir(word)):
+                    inputs.note(Path(word))
+        inputs.refuse(*written)
 
 
 def repeated(args: list[str], lists: set[str]) -> list[str]:
@@ -140,17 +102,16 @@ def flowing(text: str) -> str:
     return "\n\n".join(" ".join(part.split()) for part in text.split("\n\n"))
 
 
-def by_option(
-    message: str, options: Sequence[str], other: Mapping[str, tuple[str, ...]] = OPTIONS_OF
-) -> str:
-    """``message`` with "Recipe.seconds", or "seconds" at its start, as "--seconds".
+def by_option(message: str, options: Sequence[str], fills: Mapping[str, str]) -> str:
+    """``message`` with "Recipe.seconds", "Rule.within_s", or such a name at its start, as options.
 
     options  of the verb: names without one stay as they are
-    other    options of fields that are called otherwise
+    fills    options of fields that are called otherwise
     """
 
     def option(field: str, name: str) -> str:
-        known = (*other.get(field, ()), f"--{name.replace('_', '-')}")
+        own = f"--{name.replace('_', '-')}"
+        known = (fills.get(field, own), own.removesuffix("-s").removesuffix("-m"))
         return next((word for word in known if word in options), field)
 
     message = _FIELD.sub(lambda found: option(found[0], found[2]), message)

@@ -1,19 +1,20 @@
 # SPDX-License-Identifier: Apache-2.0
 """Options that several verbs have, and what their words mean: each is declared and read here once.
 
-With them: of which axis of ``sim.core.dynamism`` the levels of ``compare`` and ``drive`` are.
+Groups of them are dataclasses, for ``scripts.spec.part``. With them: of which axis of
+``sim.core.dynamism`` the levels of ``compare`` and ``drive`` are.
 """
 
 import re
 from collections.abc import Sequence
-from dataclasses import asdict, dataclass
+from dataclasses import dataclass
+from functools import partial
 from pathlib import Path
-from typing import Annotated, Any
-
-import typer
+from typing import Any
 
 from scenes import is_file
 from scripts.console import note
+from scripts.spec import SCANNERS, SLAMS, option, part, spec
 from slam.errors import InvalidValueError
 from slam.names import NameFromFile, is_code, refuse_code
 from slam.set_numbers import with_set
@@ -26,153 +27,196 @@ MAX_SWEEP = 1000
 LMS221_HZ = 37.5  # the rate for which the usual numbers of scans are chosen
 BETWEEN = re.compile(r",(?![^{]*\}|[^(]*\))")  # a comma outside braces and brackets
 
-Seconds = Annotated[float, typer.Option(help="Length of the simulated tour, s.")]
-DynamismLevel = Annotated[
-    float, typer.Option(help="How much the simulated room moves: 0 nothing, 1 most.")
-]
-Motion = Annotated[
-    float | None,
-    typer.Option(help="What moves now, 0 to 1; default as --dynamism says."),
-]
-Change = Annotated[
-    float | None,
-    typer.Option(
-        help="Of what can move, the share that stands elsewhere when it is seen again, 0 to 1; "
-        "default as --dynamism says."
-    ),
-]
-CrowdOption = Annotated[
-    str | None,
-    typer.Option(
-        "--crowd",
-        help="Who is there besides: none, or like escorts:6,boards:2; default the scene's own at "
-        "this motion (mobilia config crowds).",
-    ),
-]
-EventsOption = Annotated[
-    Path | None,
-    typer.Option(
-        "--events",
-        help="TOML file of what happens when: pushes, doors, people who enter, the robot carried.",
-    ),
-]
-RobotOption = Annotated[
-    str | None,
-    typer.Option(
-        "--robot",
-        help="Another robot than the scene's: f1tenth, hunter2, pioneer3dx, rosbot_xl, "
-        "turtlebot3, or a TOML file.",
-    ),
-]
-MotionLevels = Annotated[
-    list[str] | None, typer.Option("--motion", help="Levels of motion alone, or one to hold.")
-]
-ChangeLevels = Annotated[
-    list[str] | None, typer.Option("--change", help="Levels of change alone, or one to hold.")
-]
-PeopleLevels = Annotated[
-    list[str] | None,
-    typer.Option("--people", help="Levels of how many people walk with the robot, as 0:16:4."),
-]
-Seed = Annotated[int, typer.Option(help="Seed of the simulated run, whole number >= 0.")]
-ScanHeight = Annotated[
-    float, typer.Option(help="Height of the simulated scanner above the floor, m.")
-]
-Scanner = Annotated[
-    str,
-    typer.Option(
-        help="Which scanner, and which of its errors: utm30lx, tim561:noise, "
-        "'scanner(fov_deg=270, beams=541, rate_hz=20, sigma_m=0.01)'; full, noise (statistical "
-        "only) and ideal are the LMS-221's."
-    ),
-]
-TextFormat = Annotated[
-    Path | None,
-    typer.Option("--format", help="TOML file that says which columns of a text log hold what."),
-]
-Strict = Annotated[
-    bool,
-    typer.Option(
-        "--strict",
-        help="Refuse a log that would have to be repaired, or whose scans contradict the place of "
-        "its scanner; exit status 6 where more than a third of the scans are not trusted.",
-    ),
-]
-Laser = Annotated[
-    str | None,
-    typer.Option(
-        "--laser",
-        help="Where a log's scanner is on the robot, m, m and degrees: --laser 0.1,0,180 looks "
+# Options: a field is ``seconds: float = SECONDS(60.0)``.
+SECONDS = partial(option, "Length of the simulated tour, s.")
+SEED = partial(option, "Seed of the simulated run, whole number >= 0.")
+SCANNER = partial(
+    option,
+    "Which scanner, and which of its errors: utm30lx, tim561:noise, "
+    "'scanner(fov_deg=270, beams=541, rate_hz=20, sigma_m=0.01)'; full, noise (statistical "
+    "only) and ideal are the LMS-221's.",
+    "full",
+    complete=SCANNERS,
+)
+CROWD = partial(
+    option,
+    "Who is there besides: none, or like escorts:6,boards:2; default the scene's own at "
+    "this motion (mobilia config crowds).",
+)
+STRICT = partial(
+    option,
+    "Refuse a log that would have to be repaired, or whose scans contradict the place of "
+    "its scanner; exit status 6 where more than a third of the scans are not trusted.",
+    False,
+)
+ORACLES = partial(
+    option,
+    "Also this SLAM without the returns from what can move, by the true labels; "
+    "SLAM,moving: from what moves now; map: scan matching to the true map. Repeatable.",
+    metavar="SLAM[,moving]|map",
+    complete=SLAMS,
+)
+SET = partial(
+    option,
+    "Change a number of a SLAM: --set matching.reward=7. With several SLAMs its name "
+    "comes first: --set ekf.PATH=VALUE. mobilia config SLAM lists all. Repeatable.",
+    None,
+    "--set",
+    metavar="[SLAM.]PATH=VALUE",
+)
+OVERWRITE = partial(option, "Replace an earlier run in that folder.", False)
+PLAN = partial(
+    option, "Only say what would run, and about how long it would take.", False, "--plan"
+)
+TRUST = partial(
+    option, "Run the code that RUN's files name: module:Class, module:function, pipe:.", False
+)
+FILM = partial(option, "Write film.mp4.")
+
+
+@spec
+class Work:
+    """Who does it, and whether it is done at all."""
+
+    jobs: int = option("Processes of this machine.", 1)
+    cluster: str | None = option("Or a Dask scheduler, tcp://host:port, that shares --out.")
+    plan_only: bool = PLAN()
+
+
+@spec
+class Recorded:
+    """How a log is to be read."""
+
+    text_format: Path | None = option(
+        "TOML file that says which columns of a text log hold what.", None, "--format"
+    )
+    laser: str | None = option(
+        "Where a log's scanner is on the robot, m, m and degrees: --laser 0.1,0,180 looks "
         "backwards. Default as the log says.",
+        None,
         metavar="X,Y,YAW_DEG",
-    ),
-]
-Flip = Annotated[
-    bool, typer.Option("--flip", help="A log's beams count the other way round (it hangs).")
-]
-Oracles = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--oracle",
-        help="Also this SLAM without the returns from what can move, by the true labels; "
-        "SLAM,moving: from what moves now; map: scan matching to the true map. Repeatable.",
-        metavar="SLAM[,moving]|map",
-    ),
-]
-Set = Annotated[
-    list[str] | None,
-    typer.Option(
-        "--set",
-        help="Change a number of a SLAM: --set matching.reward=7. With several SLAMs its name "
-        "comes first: --set ekf.PATH=VALUE. mobilia config SLAM lists all. Repeatable.",
-        metavar="[SLAM.]PATH=VALUE",
-    ),
-]
-Overwrite = Annotated[
-    bool, typer.Option("--overwrite", help="Replace an earlier run in that folder.")
-]
-PlanOnly = Annotated[
-    bool,
-    typer.Option("--plan", help="Only say what would run, and about how long it would take."),
-]
-Jobs = Annotated[int, typer.Option(help="Processes of this machine.")]
-Cluster = Annotated[
-    str | None, typer.Option(help="Or a Dask scheduler, tcp://host:port, that shares --out.")
-]
-Trust = Annotated[
-    bool,
-    typer.Option(
-        "--trust", help="Run the code that RUN's files name: module:Class, module:function, pipe:."
-    ),
-]
+    )
+    flip: bool = option("A log's beams count the other way round (it hangs).", False)
+    strict: bool = STRICT()
 
 
-@dataclass(frozen=True, kw_only=True)
-class Held:
-    """What holds in every run: levels of axes in [0, 1] and the crowd; None: as dynamism says."""
+@spec
+class Moves:
+    """What moves in a room."""
 
-    motion: float | None = None
-    change: float | None = None
-    crowd: str | None = None
+    dynamism: float = option("How much the simulated room moves: 0 nothing, 1 most.", 0.5)
+    motion: float | None = option("What moves now, 0 to 1; default as --dynamism says.")
+    change: float | None = option(
+        "Of what can move, the share that stands elsewhere when it is seen again, 0 to 1; "
+        "default as --dynamism says.",
+    )
+    crowd: str | None = CROWD()
 
-    def __post_init__(self) -> None:
-        for name in ("motion", "change"):
-            value = getattr(self, name)
-            if value is not None and not 0.0 <= value <= 1.0:
-                raise InvalidValueError(f"--{name} must lie in [0, 1], got {value}")
-        if self.crowd is not None:
-            from scenes.crowd import crowd_of
-
-            crowd_of(self.crowd)
-
-    def world(self, scene: str | None, dynamism: float, seed: int) -> dict[str, Any]:
+    def world(self, scene: str | None, seed: int) -> dict[str, Any]:
         """The settings of a room, as ``Simulation`` takes them; what is None is not among them."""
-        given = {name: value for name, value in asdict(self).items() if value is not None}
+        check_held(self.motion, self.change, self.crowd)
+        given = {"motion": self.motion, "change": self.change, "crowd": self.crowd}
         if scene is not None and is_file(scene):
             from scenes.scene_file import sha256_of
 
             given["scene_sha256"] = sha256_of(scene)
-        return {"scene": scene, "dynamism": dynamism, **given, "seed": seed}
+        told = {name: value for name, value in given.items() if value is not None}
+        return {"scene": scene, "dynamism": self.dynamism, **told, "seed": seed}
+
+
+@spec
+class Staged:
+    """What happens in a room at stated times, and to which robot."""
+
+    events: Path | None = option(
+        "TOML file of what happens when: pushes, doors, people who enter, the robot carried."
+    )
+    robot: str | None = option(
+        "Another robot than the scene's: f1tenth, hunter2, pioneer3dx, rosbot_xl, "
+        "turtlebot3, or a TOML file.",
+    )
+
+    def settings(self) -> dict[str, Any]:
+        """The events of the file and the tables of the robot, as ``Simulation`` takes them."""
+        from sim.world.robots import read_robot
+        from sim.world.script import read_events
+
+        given = {} if self.events is None else {"events": read_events(self.events)}
+        return given if self.robot is None else {**given, "robot": read_robot(self.robot)}
+
+
+@spec
+class Tour:
+    """A tour of a simulated scene."""
+
+    seconds: float = SECONDS(60.0)
+    moves: Moves = part(Moves)
+    staged: Staged = part(Staged)
+    seed: int = SEED(0)
+    scan_height: float = option("Height of the simulated scanner above the floor, m.", 0.36)
+    scanner: str = SCANNER()
+
+    def settings(self, scene: str) -> dict[str, Any]:
+        """All of it and the scene, for a recipe and for ``Simulation``."""
+        return {
+            **self.moves.world(scene, self.seed), "seconds": self.seconds,
+            "scan_height_m": self.scan_height, "laser": self.scanner, **self.staged.settings(),
+        }  # fmt: skip
+
+
+@spec
+class Levels:
+    """Levels of one axis, and what is held in all of them."""
+
+    dynamism: list[str] | None = option(
+        "Levels, as start:stop:step or one by one.", fills=("Plan.levels",)
+    )
+    motion: list[str] | None = option("Levels of motion alone, or one to hold.")
+    change: list[str] | None = option("Levels of change alone, or one to hold.")
+    people: list[str] | None = option("Levels of how many people walk with the robot, as 0:16:4.")
+    crowd: str | None = CROWD()
+
+    def of_plan(self) -> dict[str, Any]:
+        """``axis``, ``levels`` and what is held, as the plans of studies take them.
+
+        The axis is the one with several levels, else people, dynamism, motion or change, the first
+        given; default 0 to 1 dynamism.
+        """
+        given = {name: levels(getattr(self, name) or [], f"--{name}") for name in AXES}
+        several = [name for name, values in given.items() if len(values) > 1]
+        if len(several) > 1:
+            words = " and --".join(several)
+            raise InvalidValueError(f"several levels of one axis only, got --{words}")
+        if given[PEOPLE] and several not in ([], [PEOPLE]):
+            raise InvalidValueError(
+                f"--people are levels, and cannot be held beside --{several[0]}"
+            )
+        axis = (several or [name for name in (PEOPLE, *AXES) if given[name]] or ["dynamism"])[0]
+        if axis != "dynamism" and given["dynamism"]:
+            raise InvalidValueError(
+                f"--dynamism sets both axes: with levels of --{axis} give the other axis instead"
+            )
+        held = {name: given[name][0] for name in ("motion", "change") if given[name]}
+        held = {name: level for name, level in held.items() if name != axis}
+        at = given[axis] or levels(["0:1:0.25"], "--dynamism")
+        return {"axis": axis, "levels": at, **held, "crowd": self.crowd}
+
+
+def exactly_one(words: str, *given: object) -> None:
+    """``InvalidValueError`` unless one of those that ``words`` name is given."""
+    if sum(one is not None for one in given) != 1:
+        raise InvalidValueError(f"name exactly one of {words}")
+
+
+def check_held(motion: float | None, change: float | None, crowd: str | None) -> None:
+    """``InvalidValueError`` for what cannot hold in a room; None is as dynamism says."""
+    for name, value in (("motion", motion), ("change", change)):
+        if value is not None and not 0.0 <= value <= 1.0:
+            raise InvalidValueError(f"--{name} must lie in [0, 1], got {value}")
+    if crowd is not None:
+        from scenes.crowd import crowd_of
+
+        crowd_of(crowd)
 
 
 def options_with(crowd: str | None) -> dict[str, Any]:
@@ -180,48 +224,40 @@ def options_with(crowd: str | None) -> dict[str, Any]:
     return {} if crowd is None else {"crowd": crowd}
 
 
-def staged(events: Path | None, robot: str | None) -> dict[str, Any]:
-    """The events of a file and the tables of a robot, as ``Simulation`` takes them."""
-    from sim.world.robots import read_robot
-    from sim.world.script import read_events
-
-    given = {} if events is None else {"events": read_events(events)}
-    return given if robot is None else {**given, "robot": read_robot(robot)}
-
-
 @dataclass(frozen=True, kw_only=True)
 class Axis:
     """What the levels of a comparison or a drive are of, and what is held.
 
-    name  one of ``AXES``; with "motion" the other, change, is at 0 unless held, and so round;
-          with ``PEOPLE`` the levels are numbers of people, and nobody else is there
+    name    one of ``AXES``; with "motion" the other, change, is at 0 unless held, and so round;
+            with ``PEOPLE`` the levels are numbers of people, and nobody else is there
+    motion, change, crowd  the same at every level; None: as dynamism says
     """
 
     name: str = "dynamism"
-    held: Held = Held()
+    motion: float | None = None
+    change: float | None = None
+    crowd: str | None = None
 
     def __post_init__(self) -> None:
+        check_held(self.motion, self.change, self.crowd)
         if self.name not in AXES:
             raise InvalidValueError(f"axis must be one of {', '.join(AXES)}, got {self.name!r:.80}")
-        if getattr(self.held, self.name, None) is not None:
+        if getattr(self, self.name, None) is not None:
             raise InvalidValueError(f"--{self.name} cannot be held: the levels are of it")
-        if self.name == PEOPLE and self.held.crowd is not None:
+        if self.name == PEOPLE and self.crowd is not None:
             raise InvalidValueError("--crowd cannot be held: the levels are of people")
 
     def at(self, level: float) -> dict[str, Any]:
         """``dynamism``, ``motion`` and ``change`` at a level, as ``Simulation`` takes them."""
-        held = {"motion": self.held.motion, "change": self.held.change}
-        if self.name == "dynamism":
-            return {"dynamism": level, **held}
-        if self.name == PEOPLE:
-            motion = PEOPLE_MOTION if self.held.motion is None else self.held.motion
-            return {"dynamism": 0.0, **held, "motion": motion}
-        return {"dynamism": 0.0, **held, self.name: level}
-
-    def crowd(self, level: float) -> str | None:
-        """Who is there at a level, as ``Held.crowd``; ``InvalidValueError`` for half a person."""
+        room = {"dynamism": 0.0, "motion": self.motion, "change": self.change}
         if self.name != PEOPLE:
-            return self.held.crowd
+            return {**room, self.name: level}
+        return room if self.motion is not None else {**room, "motion": PEOPLE_MOTION}
+
+    def crowd_at(self, level: float) -> str | None:
+        """Who is there at a level, as ``crowd``; ``InvalidValueError`` for half a person."""
+        if self.name != PEOPLE:
+            return self.crowd
         if level not in range(MOST_PEOPLE + 1):
             raise InvalidValueError(
                 f"--people must be whole numbers in 0..{MOST_PEOPLE}, got {level:g}"
@@ -229,12 +265,25 @@ class Axis:
         return f"escorts:{level:g}"
 
 
-def sweep(text: str, option: str = "--dynamism-sweep", most: float = 1.0) -> tuple[float, ...]:
-    """``0:1:0.25`` -> (0, 0.25, 0.5, 0.75, 1); ``InvalidValueError`` for anything else."""
-    try:
-        start, stop, step = (float(word) for word in text.split(":"))
-    except ValueError:
-        raise InvalidValueError(f"{option} must be start:stop:step, got {text!r}") from None
+def levels(values: list[str], option: str) -> tuple[float, ...]:
+    """``["0:1:0.5"]`` or ``["0", "0.5,1"]`` -> (0, 0.5, 1)."""
+    found: list[float] = []
+    for word in named(values):
+        kind = "start:stop:step" if ":" in word else "numbers or start:stop:step"
+        try:
+            numbers = [float(number) for number in word.split(":")]
+        except ValueError:
+            numbers = []
+        if len(numbers) not in (1, 3):
+            raise InvalidValueError(f"{option} must be {kind}, got {word!r}")
+        found += numbers if len(numbers) == 1 else _sweep(word, numbers, option)
+    return tuple(found)
+
+
+def _sweep(text: str, numbers: list[float], option: str) -> list[float]:
+    """Start, stop and step -> levels, both ends among them."""
+    start, stop, step = numbers
+    most = MOST_PEOPLE if option == f"--{PEOPLE}" else 1.0
     if not (step > 0.0 and 0.0 <= start <= stop <= most):
         raise InvalidValueError(
             f"{option} needs step > 0 and 0 <= start <= stop <= {most:g}, got {text!r}"
@@ -242,50 +291,7 @@ def sweep(text: str, option: str = "--dynamism-sweep", most: float = 1.0) -> tup
     count = int((stop - start) / step + 1e-9) + 1
     if count > MAX_SWEEP:
         raise InvalidValueError(f"{option} {text!r}: {count} levels, at most {MAX_SWEEP}")
-    return tuple(round(start + k * step, 9) for k in range(count))
-
-
-def axis_levels(
-    dynamism: list[str] | None,
-    motion: list[str] | None,
-    change: list[str] | None,
-    people: list[str] | None = None,
-) -> tuple[str, tuple[float, ...], dict[str, Any]]:
-    """The axis, its levels and what is held, from the options; default 0 to 1 dynamism.
-
-    The axis is the one with several levels, else people, dynamism, motion or change, the first
-    given.
-    """
-    words = dict(zip(AXES, (dynamism, motion, change, people), strict=True))
-    given = {name: levels(values or [], f"--{name}") for name, values in words.items()}
-    several = [name for name, values in given.items() if len(values) > 1]
-    if len(several) > 1:
-        raise InvalidValueError(f"several levels of one axis only, got --{' and --'.join(several)}")
-    if given[PEOPLE] and several not in ([], [PEOPLE]):
-        raise InvalidValueError(f"--people are levels, and cannot be held beside --{several[0]}")
-    name = (several or [axis for axis in (PEOPLE, *AXES) if given[axis]] or ["dynamism"])[0]
-    if name != "dynamism" and given["dynamism"]:
-        raise InvalidValueError(
-            f"--dynamism sets both axes: with levels of --{name} give the other axis instead"
-        )
-    held = {axis: given[axis][0] for axis in ("motion", "change") if axis != name and given[axis]}
-    return name, given[name] or levels(["0:1:0.25"]), held
-
-
-def levels(values: list[str], option: str = "--dynamism") -> tuple[float, ...]:
-    """``["0:1:0.5"]`` or ``["0", "0.5,1"]`` -> (0, 0.5, 1)."""
-    found: list[float] = []
-    for word in named(values):
-        if ":" in word:
-            found += sweep(word, option, MOST_PEOPLE if option == f"--{PEOPLE}" else 1.0)
-            continue
-        try:
-            found.append(float(word))
-        except ValueError:
-            raise InvalidValueError(
-                f"{option} must be numbers or start:stop:step, got {word!r}"
-            ) from None
-    return tuple(found)
+    return [round(start + k * step, 9) for k in range(count)]
 
 
 def rate_hz(scanner: str) -> float:

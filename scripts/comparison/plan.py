@@ -17,7 +17,7 @@ from scripts.comparison.schema import LATER, settings
 from scripts.imports import code_of
 from scripts.jobs import Job
 from scripts.names import file_name
-from scripts.options import Axis, Held, options_with, whole
+from scripts.options import Axis, options_with, whole
 from sim.recording.recipe import Recipe
 from sim.simulation import n_frames
 from sim.world.times_of_day import MOST_SESSIONS
@@ -75,8 +75,7 @@ class Asked:
     @property
     def levels_of(self) -> Axis:
         """What the levels are of; errors for an axis that is none."""
-        held = Held(motion=self.motion, change=self.change, crowd=self.crowd)
-        return Axis(name=self.axis, held=held)
+        return Axis(name=self.axis, motion=self.motion, change=self.change, crowd=self.crowd)
 
     def check_each_once(self, *names: str) -> None:
         """``InvalidValueError`` for a field that names nothing, or something twice."""
@@ -185,7 +184,7 @@ class Plan(Asked):
             options = {k: v for k, v in given.items() if k not in _OF_RECIPE}
         else:
             axis = self.levels_of
-            own, options = axis.at(run.dynamism), options_with(axis.crowd(run.dynamism))
+            own, options = axis.at(run.dynamism), options_with(axis.crowd_at(run.dynamism))
         return Recipe(
             scene=run.scene, seed=run.seed, **own, seconds=self.seconds, scanner=self.scanner,
             odometry=self.odometry, options=options,

@@ -3,74 +3,29 @@
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
 from rich.markup import escape
 from rich.table import Table
 
+from scripts import options
 from scripts.console import console, note, say
 from scripts.names import check
-from scripts.options import Cluster, Jobs, PlanOnly, Set, named
+from scripts.options import named
+from scripts.spec import SLAMS, names_of, option, part, spec
 from slam.errors import MissingPathError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
     from scripts.benchmark.board import Board
 
+
 UNFAIR = "* does not count: no oracle holds there"
 MOST_COLUMNS = 5  # SLAMs in the table of the terminal; the page has all
 
 
-def benchmark(
-    out: Annotated[Path, typer.Option(help="Folder of the benchmark.")] = Path("out/benchmark"),
-    slam: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="SLAMs, by name, module:Class or pipe:COMMAND: --slam A B C; default all that are "
-            "installed. odometry and an oracle are always there."
-        ),
-    ] = None,
-    subject: Annotated[
-        str | None,
-        typer.Option(help="The SLAM that the sentence on top is about; default the first."),
-    ] = None,
-    tracks: Annotated[
-        list[str] | None, typer.Option(help="Tracks, by name: --tracks A B C; default all.")
-    ] = None,
-    quick: Annotated[
-        bool,
-        typer.Option(
-            "--quick",
-            help="Three levels, one seed of the tracks that ship, the subject alone: minutes.",
-        ),
-    ] = False,
-    train: Annotated[
-        bool, typer.Option("--train", help="On the seeds for tuning, not on those that count.")
-    ] = False,
-    seeds: Annotated[
-        int | None, typer.Option(help="Seeds at every level; default 6, with --quick 1.")
-    ] = None,
-    seconds: Annotated[
-        float | None, typer.Option(help="Length of a run, s, to try out; default the track's own.")
-    ] = None,
-    days: Annotated[
-        bool,
-        typer.Option("--days", help="Also in buildings that go on over sessions: days.csv."),
-    ] = False,
-    submit: Annotated[
-        str | None,
-        typer.Option(metavar="NAME", help="Also write OUT/submission_NAME.json of the subject."),
-    ] = None,
-    merge: Annotated[
-        list[Path] | None,
-        typer.Option(help="Submissions of others, or published runs, to put into the leaderboard."),
-    ] = None,
-    jobs: Jobs = 1,
-    cluster: Cluster = None,
-    plan_only: PlanOnly = False,
-    set_: Set = None,
-) -> None:
+@spec
+class Benchmark:
     """Find out on which track, and from which level on, a SLAM gets lost.
 
     Writes leaderboard.json, leaderboard.csv and leaderboard.md, and a folder of mobilia compare for
@@ -79,41 +34,79 @@ def benchmark(
 
     [bold]mobilia benchmark --quick --slam my_package:MySlam --jobs 2[/bold]
     """
-    slams = named(slam or [])
-    check((*slams, *([subject] if subject else [])))
-    from scripts import pace, workers
-    from scripts.benchmark import runs_file
-    from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, plans_of, wanted_of
-    from scripts.benchmark.tracks import chosen
-    from scripts.comparison.plan import ahead
 
-    workers.check_jobs(jobs)
-    for path in merge or ():
-        if not path.exists():
-            raise MissingPathError(path, "no such file")
-    given = [runs_file.read(path) for path in merge or ()]
-    others = [one for one in given if one.name]
-    ship = next((one for one in reversed(given) if not one.name), None) or runs_file.read()
-    count = seeds if seeds is not None else QUICK_SEEDS if quick else SEEDS
-    runs = tuple(dict.fromkeys((*slams, *([subject] if subject else []))))
-    numbered = dict(zip(runs, with_set(runs, set_ or []), strict=True))
-    asked = chosen(named(tracks or []))
-    if quick and not tracks:
-        asked = ship.quick(asked) or asked
-    wanted = wanted_of(
-        asked, [numbered[name] for name in slams],
-        None if subject is None else numbered[subject],
-        train=train, seeds=count, quick=quick, seconds=seconds, submit=submit, days=days,
-    )  # fmt: skip
-    parts = [ahead(plan, out / name) for name, plan in plans_of(wanted, ship).items()]
-    works = [job.work() for missing, _ in parts for job in missing]
-    what = f"{len(works)} of {sum(count for _, count in parts)} jobs, tracks: {len(parts)}"
-    pace.announce(what + (", buildings over days besides" if days else ""), works, jobs)
-    if plan_only:
-        return
-    started = time.perf_counter()
-    board = carry_out(wanted, out, jobs=jobs, cluster=cluster, merge=others, shared=ship)
-    _tell(board, out, time.perf_counter() - started)
+    out: Path = option("Folder of the benchmark.", Path("out/benchmark"), writes=True)
+    slam: list[str] | None = option(
+        "SLAMs, by name, module:Class or pipe:COMMAND: --slam A B C; default all that are "
+        "installed. odometry and an oracle are always there.",
+        complete=SLAMS,
+        fills=("Plan.slams",),
+    )
+    subject: str | None = option(
+        "The SLAM that the sentence on top is about; default the first.", complete=SLAMS
+    )
+    tracks: list[str] | None = option(
+        "Tracks, by name: --tracks A B C; default all.",
+        complete=names_of("scripts.benchmark.tracks:TRACKS"),
+    )
+    quick: bool = option(
+        "Three levels, one seed of the tracks that ship, the subject alone: minutes.", False
+    )
+    train: bool = option("On the seeds for tuning, not on those that count.", False)
+    seeds: int | None = option("Seeds at every level; default 6, with --quick 1.")
+    seconds: float | None = option("Length of a run, s, to try out; default the track's own.")
+    days: bool = option("Also in buildings that go on over sessions: days.csv.", False)
+    submit: str | None = option(
+        "Also write OUT/submission_NAME.json of the subject.", metavar="NAME"
+    )
+    merge: list[Path] | None = option(
+        "Submissions of others, or published runs, to put into the leaderboard."
+    )
+    work: options.Work = part(options.Work)
+    set_: list[str] | None = options.SET()
+
+    def __call__(self) -> None:
+        slams = named(self.slam or [])
+        runs = tuple(dict.fromkeys((*slams, *([self.subject] if self.subject else []))))
+        check(runs)
+        from scripts import pace, workers
+        from scripts.benchmark import runs_file
+        from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, plans_of, wanted_of
+        from scripts.benchmark.tracks import chosen
+        from scripts.comparison.plan import ahead
+
+        workers.check_jobs(self.work.jobs)
+        merge = self.merge or []
+        for path in merge:
+            if not path.exists():
+                raise MissingPathError(path, "no such file")
+        given = [runs_file.read(path) for path in merge]
+        others = [one for one in given if one.name]
+        ship = next((one for one in reversed(given) if not one.name), None) or runs_file.read()
+        usual = QUICK_SEEDS if self.quick else SEEDS
+        numbered = dict(zip(runs, with_set(runs, self.set_ or []), strict=True))
+        asked = chosen(named(self.tracks or []))
+        if self.quick and not self.tracks:
+            asked = ship.quick(asked) or asked
+        wanted = wanted_of(
+            asked, [numbered[name] for name in slams],
+            None if self.subject is None else numbered[self.subject],
+            train=self.train, seeds=usual if self.seeds is None else self.seeds,
+            quick=self.quick, seconds=self.seconds, submit=self.submit, days=self.days,
+        )  # fmt: skip
+        parts = [ahead(plan, self.out / name) for name, plan in plans_of(wanted, ship).items()]
+        works = [job.work() for missing, _ in parts for job in missing]
+        what = f"{len(works)} of {sum(count for _, count in parts)} jobs, tracks: {len(parts)}"
+        besides = ", buildings over days besides" if self.days else ""
+        pace.announce(what + besides, works, self.work.jobs)
+        if self.work.plan_only:
+            return
+        started = time.perf_counter()
+        board = carry_out(
+            wanted, self.out, jobs=self.work.jobs, cluster=self.work.cluster, merge=others,
+            shared=ship,
+        )  # fmt: skip
+        _tell(board, self.out, time.perf_counter() - started)
 
 
 def _tell(board: "Board", out: Path, spent_s: float) -> None:

@@ -2,73 +2,23 @@
 """``mobilia blame``: a counterfactual debugger."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
-
-import typer
+from typing import TYPE_CHECKING
 
 from scripts import options
 from scripts.console import console, say
 from scripts.debugger.question import Question
 from scripts.names import check, file_name, run_name
+from scripts.spec import SCENES, SLAMS, argument, option, part, spec
 from slam.errors import InvalidValueError
 from slam.evaluation.lost import Rule
 
 if TYPE_CHECKING:
     from scripts.debugger.counterfactual import Inquest
+    from scripts.debugger.recording import Case
 
 
-def blame(
-    run: Annotated[
-        Path | None,
-        typer.Argument(
-            help="Folder of a simulated run, an episode, or DIR/runs/NAME.npz of a comparison.",
-            metavar="[RUN]",
-        ),
-    ] = None,
-    slam: Annotated[
-        str | None, typer.Option(help="SLAM to examine; default the run's first, or shunting.")
-    ] = None,
-    scene: Annotated[str | None, typer.Option(help="Instead of RUN: a scene to simulate.")] = None,
-    dynamism: options.DynamismLevel = 0.5,
-    motion: options.Motion = None,
-    change: options.Change = None,
-    crowd: options.CrowdOption = None,
-    seed: options.Seed = 0,
-    seconds: options.Seconds = 60.0,
-    scanner: options.Scanner = "full",
-    option: Annotated[
-        list[str] | None, typer.Option(help="Option of the scene: NAME=VALUE, e.g. n_chairs=6.")
-    ] = None,
-    every: Annotated[int, typer.Option(help="The SLAM gets one scan in so many.")] = 1,
-    threshold: Annotated[
-        float, typer.Option(help="Rise of the error that counts as a divergence, m.")
-    ] = Rule.threshold_m,
-    within: Annotated[float, typer.Option(help="Time within which it rises, s.")] = Rule.within_s,
-    at: Annotated[
-        float | None, typer.Option(help="Examine this time instead of searching, s.")
-    ] = None,
-    lead: Annotated[
-        float, typer.Option(help="Time from the checkpoint to the divergence, s.")
-    ] = Question.lead_s,
-    horizon: Annotated[
-        float, typer.Option(help="Time from the divergence to the end of the re-runs, s.")
-    ] = Question.horizon_s,
-    top: Annotated[
-        int, typer.Option(help="Try only this many of the likeliest; 0: all observed.")
-    ] = Question.top,
-    who: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="Try only these: a mover, a group (escorts, chairs) or a pattern (group[0-3])."
-        ),
-    ] = None,
-    repeats: Annotated[
-        int, typer.Option(help="Repeats of original and cure with other noise.")
-    ] = Question.repeats,
-    out: Annotated[Path | None, typer.Option(help="Folder; default out/blame-...")] = None,
-    overwrite: options.Overwrite = False,
-    trust: options.Trust = False,
-) -> None:
+@spec
+class Blame:
     """Find which mover misled a SLAM, by running the world again without it.
 
     The first divergence of the run is found, world and SLAM are put back to some seconds before,
@@ -80,37 +30,74 @@ def blame(
 
     [bold]mobilia blame --scene arena --option walls=none --dynamism 1 --slam ekf[/bold]
     """
-    if (run is None) == (scene is None):
-        raise InvalidValueError("name exactly one of RUN and --scene")
-    question = Question(
-        rule=Rule(threshold_m=threshold, within_s=within), at_s=at, lead_s=lead,
-        horizon_s=horizon, top=top, repeats=repeats, who=options.named(who or []),
-    )  # fmt: skip
-    check([slam] if slam else [], scene)
-    from scripts.debugger.make import carry_out
-    from scripts.debugger.recording import Case, case_of
 
-    if run is not None:
-        case, name = case_of(run, slam, every, trust), run_name(run)
-    else:
-        held = options.Held(motion=motion, change=change, crowd=crowd)
-        world = held.world(scene, dynamism, seed)
-        settings, name = _world(world, option or [], scanner), f"{scene}-{seed}"
-        case = Case(settings=settings, seconds=seconds, slam=slam or "shunting", every=every)
-    if at is not None and not 0.0 <= at <= case.seconds:
-        raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {at:g}")
-    folder = out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
-    _tell(carry_out(case, question, folder, overwrite=overwrite), folder, run)
+    folder: Path | None = argument(
+        "Folder of a simulated run, an episode, or DIR/runs/NAME.npz of a comparison.",
+        metavar="[RUN]",
+    )
+    slam: str | None = option(
+        "SLAM to examine; default the run's first, or shunting.", complete=SLAMS
+    )
+    scene: str | None = option("Instead of RUN: a scene to simulate.", complete=SCENES)
+    moves: options.Moves = part(options.Moves)
+    seed: int = options.SEED(0)
+    seconds: float = options.SECONDS(60.0)
+    scanner: str = options.SCANNER()
+    scene_option: list[str] | None = option(
+        "Option of the scene: NAME=VALUE, e.g. n_chairs=6.", None, "--option"
+    )
+    every: int = option("The SLAM gets one scan in so many.", 1)
+    threshold: float = option("Rise of the error that counts as a divergence, m.", Rule.threshold_m)
+    within: float = option("Time within which it rises, s.", Rule.within_s)
+    at: float | None = option("Examine this time instead of searching, s.")
+    lead: float = option("Time from the checkpoint to the divergence, s.", Question.lead_s)
+    horizon: float = option(
+        "Time from the divergence to the end of the re-runs, s.", Question.horizon_s
+    )
+    top: int = option("Try only this many of the likeliest; 0: all observed.", Question.top)
+    who: list[str] | None = option(
+        "Try only these: a mover, a group (escorts, chairs) or a pattern (group[0-3])."
+    )
+    repeats: int = option("Repeats of original and cure with other noise.", Question.repeats)
+    out: Path | None = option("Folder; default out/blame-...", writes=True)
+    overwrite: bool = options.OVERWRITE()
+    trust: bool = options.TRUST()
 
+    def __call__(self) -> None:
+        options.exactly_one("RUN and --scene", self.folder, self.scene)
+        question = Question(
+            rule=Rule(threshold_m=self.threshold, within_s=self.within), at_s=self.at,
+            lead_s=self.lead, horizon_s=self.horizon, top=self.top, repeats=self.repeats,
+            who=options.named(self.who or []),
+        )  # fmt: skip
+        check([self.slam], self.scene)
+        from scripts.debugger.make import carry_out
+        from scripts.debugger.recording import case_of
 
-def _world(world: dict[str, Any], words: list[str], scanner: str) -> dict[str, Any]:
-    """Settings of the simulation: scene, dynamism and seed, and what the options say."""
-    from scripts.debugger.recording import options_of
-    from sim.sensors.lidar.registry import scanner_of
+        if self.folder is not None:
+            case = case_of(self.folder, self.slam, self.every, self.trust)
+            name = run_name(self.folder)
+        else:
+            case, name = self._simulated(), f"{self.scene}-{self.seed}"
+        if self.at is not None and not 0.0 <= self.at <= case.seconds:
+            raise InvalidValueError(f"--at must lie in 0..{case.seconds:g} s, got {self.at:g}")
+        out = self.out or Path("out") / f"blame-{file_name(name)}-{file_name(case.slam)}"
+        _tell(carry_out(case, question, out, overwrite=self.overwrite), out, self.folder)
 
-    laser = scanner_of(scanner)
-    settings = {**world, **options_of(words)}
-    return settings if scanner == "full" else settings | {"laser": laser}
+    def _simulated(self) -> "Case":
+        """Of a scene: dynamism and seed, and what the options say."""
+        from scripts.debugger.recording import Case, options_of
+        from sim.sensors.lidar.registry import scanner_of
+
+        laser = scanner_of(self.scanner)
+        settings = {
+            **self.moves.world(self.scene, self.seed),
+            **options_of(self.scene_option or []),
+        }
+        if self.scanner != "full":
+            settings |= {"laser": laser}
+        slam = self.slam or "shunting"
+        return Case(settings=settings, seconds=self.seconds, slam=slam, every=self.every)
 
 
 def _tell(found: "Inquest", folder: Path, run: Path | None) -> None:

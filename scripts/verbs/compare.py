@@ -3,59 +3,22 @@
 
 import time
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
 from rich.markup import escape
 
 from scripts import options
 from scripts.console import console, fact, say
 from scripts.names import check
+from scripts.spec import REQUIRED, SCENES, SLAMS, option, part, spec
 from slam.guests import Limits
 
 if TYPE_CHECKING:
     from scripts.comparison.plan import Plan
 
 
-def compare(
-    slam: Annotated[
-        list[str], typer.Option(help="SLAMs, by name, module:Class or pipe:COMMAND: --slam A B C.")
-    ],
-    out: Annotated[Path, typer.Option(help="Folder of the comparison.")],
-    oracle: options.Oracles = None,
-    scene: Annotated[list[str] | None, typer.Option(help="Scenes; default arena office.")] = None,
-    dynamism: Annotated[
-        list[str] | None, typer.Option(help="Levels, as start:stop:step or one by one.")
-    ] = None,
-    motion: options.MotionLevels = None,
-    change: options.ChangeLevels = None,
-    people: options.PeopleLevels = None,
-    crowd: options.CrowdOption = None,
-    seeds: Annotated[int, typer.Option(help="Seeds at every level, the same at each.")] = 10,
-    first_seed: Annotated[
-        int, typer.Option(help="The first of them; the SLAMs here were tuned on 0 to 19.")
-    ] = 100,
-    seconds: Annotated[float, typer.Option(help="Length of a run, s.")] = 60.0,
-    every: Annotated[
-        int | None, typer.Option(help="Use one scan in N; default about 4.7 a second.")
-    ] = None,
-    scanner: options.Scanner = "full",
-    sessions: Annotated[
-        int | None,
-        typer.Option(
-            help="Also let the SLAMs live in buildings of N sessions, one beside each run. From "
-            "each session to the next the share --change of what can move is put elsewhere.",
-            metavar="N",
-        ),
-    ] = None,
-    scan_limit: Annotated[
-        float, typer.Option(help="Time limit of a scan for a SLAM from outside, s.")
-    ] = Limits.scan_s,
-    jobs: options.Jobs = 1,
-    cluster: options.Cluster = None,
-    plan_only: options.PlanOnly = False,
-    set_: options.Set = None,
-) -> None:
+@spec
+class Compare:
     """Run SLAMs on the same simulated runs; write tables of error against dynamism.
 
     With levels of --motion or --change instead, the other of the two is at 0 unless it is given;
@@ -67,50 +30,81 @@ def compare(
     [bold]mobilia compare --slam shunting ekf odometry --scene arena --dynamism 0:1:0.5 --seeds 3
     --out out/compare[/bold]
     """
-    options.whole("--seeds", seeds, 1, 10_000)
-    slams = options.with_oracles(options.named(slam), oracle, set_)
-    rooms = options.named(scene or ["arena", "office"])
-    check(slams, *rooms)
-    from scripts import pace, workers
-    from scripts.comparison.make import carry_out
-    from scripts.comparison.plan import Plan, ahead
 
-    workers.check_jobs(jobs)
-    axis, at, held = options.axis_levels(dynamism, motion, change, people)
-    plan = Plan(
-        slams=slams,
-        scenes=rooms,
-        axis=axis,
-        levels=at,
-        **held,
-        crowd=crowd,
-        seeds=tuple(range(first_seed, first_seed + seeds)),
-        seconds=seconds,
-        every=options.every_of(scanner, every, 8),
-        scanner=scanner,
-        scan_limit_s=scan_limit,
-        sessions=sessions,
-    )
-    missing, every_job = ahead(plan, out)
-    runs = f"{len(plan.runs())} runs, {len(slams)} SLAMs on each"
-    beside_ = ", buildings besides" if sessions is not None else ""
-    pace.announce(
-        f"{runs}: {len(missing)} of {every_job} jobs are to do{beside_}",
-        [job.work() for job in missing], jobs,
+    slam: list[str] = option(
+        "SLAMs, by name, module:Class or pipe:COMMAND: --slam A B C.", REQUIRED,
+        complete=SLAMS, fills=("Plan.slams",),
     )  # fmt: skip
-    if plan_only:
-        return
-    started = time.perf_counter()
-    ways: dict[str, Any] = {"jobs": jobs, "cluster": cluster}
-    if sessions is not None:
-        from scripts.days.buildings import beside
+    out: Path = option("Folder of the comparison.", REQUIRED, writes=True)
+    oracle: list[str] | None = options.ORACLES()
+    scene: list[str] | None = option(
+        "Scenes; default arena office.", complete=SCENES, fills=("Plan.scenes",)
+    )
+    levels: options.Levels = part(options.Levels)
+    seeds: int = option("Seeds at every level, the same at each.", 10)
+    first_seed: int = option("The first of them; the SLAMs here were tuned on 0 to 19.", 100)
+    seconds: float = option("Length of a run, s.", 60.0)
+    every: int | None = option("Use one scan in N; default about 4.7 a second.")
+    scanner: str = options.SCANNER()
+    sessions: int | None = option(
+        "Also let the SLAMs live in buildings of N sessions, one beside each run. From "
+        "each session to the next the share --change of what can move is put elsewhere.",
+        metavar="N",
+    )
+    scan_limit: float = option(
+        "Time limit of a scan for a SLAM from outside, s.", Limits.scan_s,
+        fills=("Limits.scan_s",),
+    )  # fmt: skip
+    work: options.Work = part(options.Work)
+    set_: list[str] | None = options.SET()
 
-        ways["more"] = beside(plan)
-    rows = carry_out(plan, out, **ways)
-    spent_s = time.perf_counter() - started
-    tell(plan, rows)
-    more = tell_ages(out) if sessions is not None else ""
-    say(f"{escape(str(out))}: runs.csv, levels.csv, paired.csv, runs/{more} ({spent_s:.0f} s)")
+    def plan(self) -> "Plan":
+        """What is to be compared; ``InvalidValueError`` for what cannot be."""
+        options.whole("--seeds", self.seeds, 1, 10_000)
+        slams = options.with_oracles(options.named(self.slam), self.oracle, self.set_)
+        rooms = options.named(self.scene or ["arena", "office"])
+        check(slams, *rooms)
+        from scripts import workers
+        from scripts.comparison.plan import Plan
+
+        workers.check_jobs(self.work.jobs)
+        return Plan(
+            slams=slams,
+            scenes=rooms,
+            **self.levels.of_plan(),
+            seeds=tuple(range(self.first_seed, self.first_seed + self.seeds)),
+            seconds=self.seconds,
+            every=options.every_of(self.scanner, self.every, 8),
+            scanner=self.scanner,
+            scan_limit_s=self.scan_limit,
+            sessions=self.sessions,
+        )
+
+    def __call__(self) -> None:
+        plan = self.plan()
+        from scripts import pace
+        from scripts.comparison.make import carry_out
+        from scripts.comparison.plan import ahead
+
+        missing, every_job = ahead(plan, self.out)
+        runs = f"{len(plan.runs())} runs, {len(plan.slams)} SLAMs on each"
+        besides = ", buildings besides" if plan.sessions is not None else ""
+        told = f"{runs}: {len(missing)} of {every_job} jobs are to do{besides}"
+        pace.announce(told, [job.work() for job in missing], self.work.jobs)
+        if self.work.plan_only:
+            return
+        started = time.perf_counter()
+        ways: dict[str, Any] = {"jobs": self.work.jobs, "cluster": self.work.cluster}
+        if plan.sessions is not None:
+            from scripts.days.buildings import beside
+
+            ways["more"] = beside(plan)
+        rows = carry_out(plan, self.out, **ways)
+        spent_s = time.perf_counter() - started
+        tell(plan, rows)
+        more = tell_ages(self.out) if plan.sessions is not None else ""
+        files = f"runs.csv, levels.csv, paired.csv, runs/{more}"
+        say(f"{escape(str(self.out))}: {files} ({spent_s:.0f} s)")
 
 
 def tell(plan: "Plan", rows: list[dict[str, Any]]) -> None:

@@ -3,10 +3,15 @@
 
 import json
 import math
+from dataclasses import asdict
 from itertools import groupby
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
+from rich.markup import escape
+from rich.table import Table
+
+from scripts.console import console
+from scripts.spec import REQUIRED, argument, names_of, option, spec
 
 if TYPE_CHECKING:
     from slam.settings import Row, Settings
@@ -16,51 +21,51 @@ ROOMS = ("actors", "dynamism", "crowds")  # what belongs to no SLAM
 LEVELS = (0.0, 0.25, 0.5, 0.75, 1.0)  # of dynamism that are printed
 
 
-def config(
-    what: Annotated[
-        str,
-        typer.Argument(
-            help="A SLAM (or a variant, SLAM{PATH=VALUE}), actors, dynamism, crowds or a scanner."
-        ),
-    ],
-    group: Annotated[
-        str, typer.Argument(help="Only the numbers whose path begins so: matching.local.")
-    ] = "",
-    as_json: Annotated[
-        bool, typer.Option("--json", help="Print JSON for programs, with bounds.")
-    ] = False,
-) -> None:
+@spec
+class Config:
     """Print every number with path, value, unit, meaning and source.
 
     Any of a SLAM's may be set: [bold]mobilia run shunting --set matching.reward=7[/bold].
 
     [bold]mobilia config shunting matching[/bold]
     """
-    if what == "dynamism":
-        _print_dynamism(as_json)
-        return
-    if what == "crowds":
-        _print_crowds(as_json)
-        return
-    from sim.sensors.lidar import numbers
 
-    tree, default = (None, None) if numbers.is_scanner(what) else _trees(what)
-    rows = _chosen(
-        numbers.numbers_of(what, BY_DEVICE) if tree is None else list(tree.rows()), group
+    what: str = argument(
+        "A SLAM (or a variant, SLAM{PATH=VALUE}), actors, dynamism, crowds or a scanner.",
+        REQUIRED,
+        complete=names_of("slam.system:names", "sim.sensors.lidar.registry:names"),
     )
-    if as_json:
-        digest = {} if tree is None else {"sha256": tree.sha256()}
-        words = {**digest, "numbers": [_plain(row) for row in rows]}
-        print(json.dumps(words, indent=1, ensure_ascii=False))
-        return
-    changed = {} if tree is None or default is None else tree.differences(default)
-    _print(rows, changed)
+    group: str = argument("Only the numbers whose path begins so: matching.local.", "")
+    as_json: bool = option("Print JSON for programs, with bounds.", False, "--json")
+
+    def __call__(self) -> None:
+        if self.what == "dynamism":
+            _print_dynamism(self.as_json)
+            return
+        if self.what == "crowds":
+            _print_crowds(self.as_json)
+            return
+        from sim.sensors.lidar import numbers
+
+        if numbers.is_scanner(self.what):
+            rows, digest, changed = numbers.numbers_of(self.what, BY_DEVICE), {}, {}
+        else:
+            tree, default = _trees(self.what)
+            rows, digest = list(tree.rows()), {"sha256": tree.sha256()}
+            changed = tree.differences(default)
+        rows = _chosen(rows, self.group)
+        if self.as_json:
+            _print_json({**digest, "numbers": [_plain(row) for row in rows]})
+        else:
+            _print(rows, changed)
+
+
+def _print_json(words: dict[str, Any]) -> None:
+    print(json.dumps(words, indent=1, ensure_ascii=False))
 
 
 def _print_crowds(as_json: bool) -> None:
     """The crowd of each scene at the levels of motion for which it is calibrated."""
-    from dataclasses import asdict
-
     from scenes.crowd import BY_LEVEL, LEVELS, OTHERS_BY_LEVEL
 
     mixes = {**BY_LEVEL, "any other": OTHERS_BY_LEVEL}
@@ -69,12 +74,8 @@ def _print_crowds(as_json: bool) -> None:
             scene: {f"{at:g}": asdict(crowd) for at, crowd in zip(LEVELS, crowds, strict=True)}
             for scene, crowds in mixes.items()
         }
-        print(json.dumps({"crowds": words}, indent=1))
+        _print_json({"crowds": words})
         return
-    from rich.table import Table
-
-    from scripts.console import console
-
     table = Table(box=None, pad_edge=False)
     table.add_column("scene")
     for at in LEVELS:
@@ -88,11 +89,10 @@ def _print_crowds(as_json: bool) -> None:
 def _print_dynamism(as_json: bool) -> None:
     """The dynamism curves: each rate of motion, and change, at five levels."""
     from scripts.result_files import finite
-    from sim.core.dynamism import CURVES as OF_MOTION
-    from sim.core.dynamism import Rate
+    from sim.core.dynamism import CURVES, Rate
 
     meaning = "of what can move, the share elsewhere when seen again"
-    curves = (*OF_MOTION, Rate("change", meaning, "1", lambda d: d))
+    curves = (*CURVES, Rate("change", meaning, "1", lambda d: d))
     rows = [(rate, [rate.at(level) for level in LEVELS]) for rate in curves]
     if as_json:
         words = [
@@ -100,12 +100,8 @@ def _print_dynamism(as_json: bool) -> None:
              "values": dict(zip(map(str, LEVELS), map(finite, values), strict=True))}
             for rate, values in rows
         ]  # fmt: skip
-        print(json.dumps({"rates": words}, indent=1, ensure_ascii=False))
+        _print_json({"rates": words})
         return
-    from rich.table import Table
-
-    from scripts.console import console
-
     table = Table(box=None, pad_edge=False)
     for heading in ("dynamism", "", *(f"{level:g}" for level in LEVELS), "unit"):
         table.add_column(heading, justify="left" if heading in ("dynamism", "") else "right")
@@ -167,10 +163,6 @@ def _plain(row: "Row") -> dict[str, Any]:
 
 
 def _print(rows: "list[Row]", changed: dict[str, Any]) -> None:
-    from rich.markup import escape
-    from rich.table import Table
-
-    from scripts.console import console
     from slam.settings import BY_HAND
 
     table = Table(box=None, pad_edge=False, show_header=False, width=min(console.width, 110))

@@ -2,31 +2,16 @@
 """``mobilia demo``: a minute of a moving office, the shunting SLAM against odometry."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from scripts import options
 from scripts.names import check
+from scripts.spec import SCENES, option, part, spec
 
 FILM_FPS = 15.0  # the whole demo is to last a minute on two cores
 
 
-def demo(
-    out: Annotated[Path, typer.Option(help="Folder to write.")] = Path("out/demo"),
-    scene: Annotated[str, typer.Option(help="Scene to drive in.")] = "office",
-    seconds: options.Seconds = 60.0,
-    dynamism: options.DynamismLevel = 0.5,
-    motion: options.Motion = None,
-    change: options.Change = 0.0,
-    crowd: options.CrowdOption = "none",
-    seed: options.Seed = 2,
-    scan_height: options.ScanHeight = 0.36,
-    scanner: options.Scanner = "full",
-    overwrite: options.Overwrite = False,
-    film: Annotated[bool, typer.Option(help="Write film.mp4.")] = True,
-    plan_only: options.PlanOnly = False,
-) -> None:
+@spec
+class Demo:
     """Drive a robot through a moving office, and compare SLAM with odometry.
 
     Writes a film, the map (PNG, and PGM + YAML for ROS map_server), trajectories (TUM, for evo),
@@ -35,13 +20,24 @@ def demo(
     a chair was taken away (changes.png); try others. Nobody accompanies the robot, and
     nothing changes out of sight, unless --crowd and --change say so.
     """
-    check(["shunting"], scene)
-    from scripts.single_run.run import on_scene
-    from scripts.single_run.session import Outputs
 
-    outputs = Outputs(folder=out, command="demo", overwrite=overwrite, film=film, film_fps=FILM_FPS)
-    held = options.Held(motion=motion, change=change, crowd=crowd)
-    settings = held.world(scene, dynamism, seed) | {
-        "seconds": seconds, "scan_height_m": scan_height, "laser": scanner,
-    }  # fmt: skip
-    on_scene(["shunting"], settings, outputs, plan_only=plan_only)
+    out: Path = option("Folder to write.", Path("out/demo"), writes=True)
+    scene: str = option("Scene to drive in.", "office", complete=SCENES)
+    tour: options.Tour = part(
+        options.Tour, without=("events", "robot"), change=0.0, crowd="none", seed=2
+    )
+    overwrite: bool = options.OVERWRITE()
+    film: bool = options.FILM(True)
+    plan_only: bool = options.PLAN()
+
+    def __call__(self) -> None:
+        check(["shunting"], self.scene)
+        from scripts.single_run.run import on_scene
+        from scripts.single_run.session import Outputs
+
+        outputs = Outputs(
+            folder=self.out, command="demo", overwrite=self.overwrite, film=self.film,
+            film_fps=FILM_FPS,
+        )  # fmt: skip
+        settings = self.tour.settings(self.scene)
+        on_scene(["shunting"], settings, outputs, plan_only=self.plan_only)

@@ -1,51 +1,43 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia doctor``: what works here, and how to get what does not."""
 
-from typing import TYPE_CHECKING, Annotated
-
-import typer
 from rich.markup import escape
 from rich.table import Table
 
 from scripts.console import console, say, working
+from scripts.spec import option, spec
 from slam.errors import MobiliaError
-
-if TYPE_CHECKING:
-    from scripts.doctor.checks import Finding
 
 _MARKS = {"ok": "[green]✓[/green]", "can do without": "[yellow]-[/yellow]",
           "missing": "[red]✗[/red]"}  # fmt: skip
 
 
-def doctor(
-    sizes: Annotated[
-        bool, typer.Option("--sizes", help="Print what the virtual environment is made of, in MB.")
-    ] = False,
-) -> None:
+@spec
+class Doctor:
     """Say what works on this machine, and how to get what does not.
 
     3D pictures, films, cores, the cache of compiled loops, packages and extras with their versions.
     ✓ is there, - can be done without, ✗ is needed and missing: then the exit status is 1.
     """
-    if sizes:
-        _print_sizes()
-        return
-    from scripts.doctor.checks import findings
 
-    with working("looking"):
-        found = findings()
-    for finding in found:
-        _print(finding)
-    missing = [finding.what for finding in found if finding.state == "missing"]
-    if missing:
-        raise MobiliaError(f"needed and missing: {', '.join(missing)}")
+    sizes: bool = option("Print what the virtual environment is made of, in MB.", False)
 
+    def __call__(self) -> None:
+        if self.sizes:
+            _print_sizes()
+            return
+        from scripts.doctor.checks import findings
 
-def _print(finding: "Finding") -> None:
-    told = f"{_MARKS[finding.state]} {escape(f'{finding.what:<24}')} {escape(finding.found)}"
-    say(told, highlight=False)
-    if finding.how:
-        say(f"    to get it: {escape(finding.how)}", highlight=False)
+        with working("looking"):
+            found = findings()
+        for one in found:
+            what = escape(f"{one.what:<24}")
+            say(f"{_MARKS[one.state]} {what} {escape(one.found)}", highlight=False)
+            if one.how:
+                say(f"    to get it: {escape(one.how)}", highlight=False)
+        missing = [one.what for one in found if one.state == "missing"]
+        if missing:
+            raise MobiliaError(f"needed and missing: {', '.join(missing)}")
 
 
 def _print_sizes() -> None:

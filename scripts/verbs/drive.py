@@ -4,46 +4,23 @@
 import time
 from dataclasses import asdict
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING
 
-import typer
 from rich.markup import escape
 
 from scripts import options
 from scripts.console import console, say
 from scripts.names import check
+from scripts.spec import REQUIRED, SCENES, SLAMS, argument, option, part, spec
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
+if TYPE_CHECKING:
+    from scripts.closed_loop.plan import Plan
 
-def drive(
-    scene: Annotated[str, typer.Argument(help="A scene by name, or module:function.")],
-    slam: Annotated[list[str], typer.Option(help="SLAMs by name or module:Class: --slam A B C.")],
-    out: Annotated[Path, typer.Option(help="Folder of the runs and their tables.")],
-    dynamism: Annotated[
-        list[str] | None, typer.Option(help="Levels, start:stop:step or one by one; 0:1:0.25.")
-    ] = None,
-    motion: options.MotionLevels = None,
-    change: options.ChangeLevels = None,
-    crowd: options.CrowdOption = None,
-    seeds: Annotated[
-        list[str] | None, typer.Option(help="How many seeds, from 100 on; or several seeds.")
-    ] = None,
-    plan_on: Annotated[
-        str, typer.Option(help="Plan paths on the layout, or on the SLAM's own map.")
-    ] = "layout",
-    seconds: Annotated[float, typer.Option(help="Time limit of each goal, s.")] = 90.0,
-    goals: Annotated[
-        list[str] | None, typer.Option(help="How many goals, or which by name; default all.")
-    ] = None,
-    every: Annotated[
-        int | None, typer.Option(help="Use one scan in N; default about 9.4 a second.")
-    ] = None,
-    scanner: options.Scanner = "full",
-    jobs: options.Jobs = 1,
-    plan_only: options.PlanOnly = False,
-    set_: options.Set = None,
-) -> None:
+
+@spec
+class Drive:
     """Drive to a goal in every room, steered by each SLAM's estimate; truth only scores.
 
     Every SLAM gets the same worlds. If it is killed, the same command continues.
@@ -51,52 +28,84 @@ def drive(
     [bold]mobilia drive arena --slam shunting odometry --dynamism 0:1:0.5 --seeds 3 --out
     out/drive[/bold]
     """
-    slams = with_set(options.named(slam), set_ or [])
-    check(slams, scene)
-    from scripts import pace, workers
-    from scripts.closed_loop.make import carry_out, said, success_table
-    from scripts.closed_loop.plan import RUNS, Plan
-    from scripts.pages.page import Page, Part, command, publish
-    from sim.loop import LoopConfig
 
-    workers.check_jobs(jobs)
-    axis, at, held = options.axis_levels(dynamism, motion, change)
-    scans, wanted = options.every_of(scanner, every, 4), options.named(goals or [])
-    plan = Plan(
-        scene=scene,
-        slams=slams,
-        axis=axis,
-        levels=at,
-        **held,
-        crowd=crowd,
-        seeds=_seeds(options.named(seeds or ["5"])),
-        goals=int(wanted[0]) if len(wanted) == 1 and wanted[0].isdecimal() else wanted,
-        loop=LoopConfig(plan_on=plan_on, limit_s=seconds, scans=scans),
-        scanner=scanner,
+    scene: str = argument("A scene by name, or module:function.", REQUIRED, complete=SCENES)
+    slam: list[str] = option(
+        "SLAMs by name or module:Class: --slam A B C.", REQUIRED, complete=SLAMS,
+        fills=("Plan.slams",),
+    )  # fmt: skip
+    out: Path = option("Folder of the runs and their tables.", REQUIRED, writes=True)
+    levels: options.Levels = part(
+        options.Levels, without=("people",), dynamism=option(
+            "Levels, start:stop:step or one by one; 0:1:0.25.", fills=("Plan.levels",)
+        ),
+    )  # fmt: skip
+    seeds: list[str] | None = option("How many seeds, from 100 on; or several seeds.")
+    plan_on: str = option("Plan paths on the layout, or on the SLAM's own map.", "layout")
+    seconds: float = option("Time limit of each goal, s.", 90.0, fills=("LoopConfig.limit_s",))
+    goals: list[str] | None = option("How many goals, or which by name; default all.")
+    every: int | None = option(
+        "Use one scan in N; default about 9.4 a second.", fills=("LoopConfig.scans",)
     )
-    missing = [job for _, job in plan.jobs() if not (out / RUNS / job.file_name()).exists()]
-    pace.announce(f"{len(missing)} drives", [job.work() for job in missing], jobs)
-    if plan_only:
-        return
-    started = time.perf_counter()
-    rows = carry_out(plan, out, jobs=jobs)
-    table = success_table(plan, rows)
-    console.print(table)
-    parts = [
-        Part(title="Goals reached", picture="closed_loop.png", table=table),
-        Part(title="Ways driven", picture="paths.png"),
-    ]
-    publish(out, Page(
-        title=f"{scene}: steered by its SLAM", said=said(plan, rows), parts=parts,
-        next={
-            "The same rooms on a tour that its errors do not steer:": command(
-                "compare", "--slam", *slams, "--scene", scene, "--out", "out/compare"
-            ),
-            "Both in one report:": command("report", "out/compare", "--drive", out),
-        },
-        settings=asdict(plan),
-    ))  # fmt: skip
-    say(f"{escape(str(out))} ({time.perf_counter() - started:.0f} s)")
+    scanner: str = options.SCANNER()
+    work: options.Work = part(options.Work, without=("cluster",))
+    set_: list[str] | None = options.SET()
+
+    def plan(self) -> "Plan":
+        """What is to be driven; ``InvalidValueError`` for what cannot be."""
+        slams = with_set(options.named(self.slam), self.set_ or [])
+        check(slams, self.scene)
+        from scripts import workers
+        from scripts.closed_loop.plan import Plan
+        from sim.loop import LoopConfig
+
+        workers.check_jobs(self.work.jobs)
+        at = self.levels.of_plan()
+        scans, goals = (
+            options.every_of(self.scanner, self.every, 4),
+            options.named(self.goals or []),
+        )
+        return Plan(
+            scene=self.scene,
+            slams=slams,
+            **at,
+            seeds=_seeds(options.named(self.seeds or ["5"])),
+            goals=int(goals[0]) if len(goals) == 1 and goals[0].isdecimal() else goals,
+            loop=LoopConfig(plan_on=self.plan_on, limit_s=self.seconds, scans=scans),
+            scanner=self.scanner,
+        )
+
+    def __call__(self) -> None:
+        plan, out, jobs = self.plan(), self.out, self.work.jobs
+        from scripts import pace
+        from scripts.closed_loop.make import carry_out, said, success_table
+        from scripts.closed_loop.plan import RUNS
+        from scripts.pages.page import Page, Part, command, publish
+
+        missing = [job for _, job in plan.jobs() if not (out / RUNS / job.file_name()).exists()]
+        pace.announce(f"{len(missing)} drives", [job.work() for job in missing], jobs)
+        if self.work.plan_only:
+            return
+        started = time.perf_counter()
+        rows = carry_out(plan, out, jobs=jobs)
+        table = success_table(plan, rows)
+        console.print(table)
+        parts = [
+            Part(title="Goals reached", picture="closed_loop.png", table=table),
+            Part(title="Ways driven", picture="paths.png"),
+        ]
+        elsewhere = ("--slam", *plan.slams, "--scene", plan.scene, "--out", "out/compare")
+        publish(out, Page(
+            title=f"{plan.scene}: steered by its SLAM", said=said(plan, rows), parts=parts,
+            next={
+                "The same rooms on a tour that its errors do not steer:": command(
+                    "compare", *elsewhere
+                ),
+                "Both in one report:": command("report", "out/compare", "--drive", out),
+            },
+            settings=asdict(plan),
+        ))  # fmt: skip
+        say(f"{escape(str(out))} ({time.perf_counter() - started:.0f} s)")
 
 
 def _seeds(words: tuple[str, ...]) -> tuple[int, ...]:

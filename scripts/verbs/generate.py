@@ -3,14 +3,13 @@
 
 import os
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
-
-import typer
+from typing import TYPE_CHECKING
 
 from scenes import registry
 from scripts import options
 from scripts.console import console
 from scripts.names import check
+from scripts.spec import REQUIRED, SCENES, argument, option, part, spec
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -19,53 +18,8 @@ if TYPE_CHECKING:
     from sim.recording.dataset import Plan
 
 
-def generate(
-    scene: Annotated[
-        list[str],
-        typer.Argument(
-            help="A scene by name, or module:function; or several, with the same seeds.",
-            metavar="SCENE...",
-        ),
-    ],
-    out: Annotated[Path, typer.Option(help="Folder of the dataset.")],
-    dynamism: Annotated[
-        list[str] | None,
-        typer.Option(
-            help="How much the room moves, 0 to 1, default 0.5; or several, each with the same "
-            "seeds: 0 0.5 1 or start:stop:step."
-        ),
-    ] = None,
-    dynamism_sweep: Annotated[str, typer.Option(help="The same.", hidden=True)] = "",
-    motion: options.Motion = None,
-    change: options.Change = None,
-    crowd: options.CrowdOption = None,
-    episodes: Annotated[
-        int | None, typer.Option(help="Episodes (in each scene, at each dynamism); default 1.")
-    ] = None,
-    split: Annotated[
-        str,
-        typer.Option(
-            help="Parts by name and number of episodes instead, no seed in two of them: "
-            "train:8,validation:1,test:1. Each gets a list of its episodes, OUT/train.txt.",
-            metavar="NAME:N,...",
-        ),
-    ] = "",
-    seconds: Annotated[float, typer.Option(help="Length of an episode, s.")] = 60.0,
-    seed: Annotated[int, typer.Option(help="Seed of the first episode; each next one adds 1.")] = 0,
-    twins: Annotated[
-        bool,
-        typer.Option("--twins", help="Each episode also semi-static and static, with one path."),
-    ] = False,
-    sessions: Annotated[
-        int, typer.Option(help="So many sessions of one building instead, --change apart.")
-    ] = 0,
-    jobs: options.Jobs = 1,
-    cluster: options.Cluster = None,
-    scanner: options.Scanner = "full",
-    events: options.EventsOption = None,
-    robot: options.RobotOption = None,
-    plan_only: options.PlanOnly = False,
-) -> None:
+@spec
+class Generate:
     """Write episodes as ROS 2 bags with truth, and the recipes that make them again.
 
     If it is killed, the same command continues: finished episodes stay, and the folder ends with
@@ -75,42 +29,84 @@ def generate(
 
     [bold]mobilia generate office arena --split train:8,validation:1,test:1 --out data[/bold]
     """
-    levels = options.levels([dynamism_sweep] if dynamism_sweep else dynamism or ["0.5"])
-    rooms = options.named(scene)
-    check([], *rooms)
-    from scripts import pace, workers
-    from scripts.dataset import carry_out
-    from sim.recording.dataset import Plan
-    from sim.recording.recipe import Recipe
-    from sim.recording.splits import split_of
 
-    if split and episodes is not None:
-        raise InvalidValueError("--split says how many episodes there are: leave --episodes out")
-    parts = split_of(split)
-    options.Held(motion=motion, change=change, crowd=crowd)  # complains by the options' names
-    first = Recipe(
-        scene=rooms[0], seed=seed, dynamism=levels[0], motion=motion, change=change,
-        seconds=seconds, scanner=scanner, options=options.options_with(crowd),
-        **options.staged(events, robot),
+    scene: list[str] = argument(
+        "A scene by name, or module:function; or several, with the same seeds.", REQUIRED,
+        metavar="SCENE...", complete=SCENES, fills=("Plan.scenes",),
     )  # fmt: skip
-    plan = Plan(
-        recipe=first, dynamisms=levels, twins=twins, sessions=sessions, split=parts,
-        episodes=sum(dict(parts).values()) or (1 if episodes is None else episodes),
-        scenes=rooms if len(rooms) > 1 else (),
-    )  # fmt: skip
-    workers.check_jobs(jobs)
-    for name in rooms:  # a wrong name is told, and a module found, before anything starts
-        registry.find(name)
-    there = set(os.listdir(out)) if out.is_dir() else set()
-    missing = [job for job in plan.jobs() if not there.issuperset(plan.folders(job))]
-    works = [pace.Work(f"generate {job.scene}", job.seconds) for job in missing]
-    pace.announce(f"{len(missing)} of {len(plan.jobs())} drives to record", works, jobs)
-    if plan_only:
-        return
-    table = carry_out(plan, out, jobs=jobs, cluster=cluster)
-    console.print(table)
-    table.title = None  # what was made now is not of the dataset
-    _page(plan, out, table)
+    out: Path = option("Folder of the dataset.", REQUIRED, writes=True)
+    dynamism: list[str] | None = option(
+        "How much the room moves, 0 to 1, default 0.5; or several, each with the same "
+        "seeds: 0 0.5 1 or start:stop:step.",
+        fills=("Plan.dynamisms",),
+    )
+    dynamism_sweep: str = option("The same.", "", hidden=True)
+    moves: options.Moves = part(options.Moves, without=("dynamism",))
+    episodes: int | None = option("Episodes (in each scene, at each dynamism); default 1.")
+    split: str = option(
+        "Parts by name and number of episodes instead, no seed in two of them: "
+        "train:8,validation:1,test:1. Each gets a list of its episodes, OUT/train.txt.",
+        "",
+        metavar="NAME:N,...",
+    )
+    seconds: float = option("Length of an episode, s.", 60.0)
+    seed: int = option("Seed of the first episode; each next one adds 1.", 0)
+    twins: bool = option("Each episode also semi-static and static, with one path.", False)
+    sessions: int = option("So many sessions of one building instead, --change apart.", 0)
+    work: options.Work = part(options.Work, without=("plan_only",))
+    scanner: str = options.SCANNER()
+    staged: options.Staged = part(options.Staged)
+    plan_only: bool = options.PLAN()
+
+    def plan(self) -> "Plan":
+        """The episodes of the dataset; ``InvalidValueError`` for what cannot be."""
+        sweep = [self.dynamism_sweep] if self.dynamism_sweep else None
+        levels = options.levels(sweep or self.dynamism or ["0.5"], "--dynamism")
+        rooms = options.named(self.scene)
+        check([], *rooms)
+        from scripts import workers
+        from sim.recording.dataset import Plan
+        from sim.recording.recipe import Recipe
+        from sim.recording.splits import split_of
+
+        if self.split and self.episodes is not None:
+            raise InvalidValueError(
+                "--split says how many episodes there are: leave --episodes out"
+            )
+        parts, moves = split_of(self.split), self.moves
+        options.check_held(moves.motion, moves.change, moves.crowd)
+        first = Recipe(
+            scene=rooms[0], seed=self.seed, dynamism=levels[0], motion=moves.motion,
+            change=moves.change, seconds=self.seconds, scanner=self.scanner,
+            options=options.options_with(moves.crowd), **self.staged.settings(),
+        )  # fmt: skip
+        usual = 1 if self.episodes is None else self.episodes
+        plan = Plan(
+            recipe=first, dynamisms=levels, twins=self.twins, sessions=self.sessions, split=parts,
+            episodes=sum(dict(parts).values()) or usual, scenes=rooms if len(rooms) > 1 else (),
+        )  # fmt: skip
+        workers.check_jobs(self.work.jobs)
+        for name in rooms:  # a wrong name is told, and a module found, before anything starts
+            registry.find(name)
+        return plan
+
+    def __call__(self) -> None:
+        plan, out = self.plan(), self.out
+        from scripts import pace
+        from scripts.dataset import carry_out
+
+        there = set(os.listdir(out)) if out.is_dir() else set()
+        missing = [job for job in plan.jobs() if not there.issuperset(plan.folders(job))]
+        works = [pace.Work(f"generate {job.scene}", job.seconds) for job in missing]
+        pace.announce(
+            f"{len(missing)} of {len(plan.jobs())} drives to record", works, self.work.jobs
+        )
+        if self.plan_only:
+            return
+        table = carry_out(plan, out, jobs=self.work.jobs, cluster=self.work.cluster)
+        console.print(table)
+        table.title = None  # what was made now is not of the dataset
+        _page(plan, out, table)
 
 
 def _page(plan: "Plan", out: Path, table: "Table") -> None:

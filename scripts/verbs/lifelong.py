@@ -3,14 +3,14 @@
 
 from collections.abc import Iterator
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated, Any
+from typing import TYPE_CHECKING, Any
 
-import typer
 from rich.markup import escape
 
+from scripts import options
 from scripts.console import console, say, working
 from scripts.names import check
-from scripts.options import CrowdOption, Motion, Overwrite, PlanOnly, Scanner, named, options_with
+from scripts.spec import SCENES, SLAMS, argument, option, part, spec
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -22,142 +22,142 @@ if TYPE_CHECKING:
 Row = dict[str, Any]
 
 
-def lifelong(
-    folder: Annotated[
-        Path | None,
-        typer.Argument(help="A dataset of [bold]mobilia generate --sessions[/bold]."),
-    ] = None,
-    slam: Annotated[
-        list[str] | None, typer.Option(help="SLAMs: --slam A B C; default shunting occupancy.")
-    ] = None,
-    scene: Annotated[
-        str | None, typer.Option(help="Or a scene, whose sessions are simulated here.")
-    ] = None,
-    sessions: Annotated[int, typer.Option(help="How many of them, the first included.")] = 11,
-    change: Annotated[
-        float, typer.Option(help="Share of things and doors put elsewhere between two sessions.")
-    ] = 0.3,
-    dynamism: Annotated[float, typer.Option(help="How much the room moves in a session.")] = 0.5,
-    motion: Motion = None,
-    crowd: CrowdOption = None,
-    seconds: Annotated[float, typer.Option(help="Length of a simulated session, s.")] = 60.0,
-    first_seconds: Annotated[
-        float | None, typer.Option(help="Of the first one, which maps the building; default three.")
-    ] = None,
-    seed: Annotated[int, typer.Option(help="Of the building.")] = 0,
-    scanner: Scanner = "full",
-    out: Annotated[Path | None, typer.Option(help="Folder to write; default out/lifelong.")] = None,
-    overwrite: Overwrite = False,
-    plan_only: PlanOnly = False,
-) -> None:
+@spec
+class Lifelong:
     """Let SLAMs live in a building: each session starts anywhere in the map of those before.
 
     [bold]mobilia lifelong --scene random-rooms --sessions 10 --change 0.3[/bold]
 
     [bold]mobilia lifelong out/days --slam shunting,occupancy,kiss-icp[/bold]
     """
-    if (folder is None) == (scene is None):
-        raise InvalidValueError("name exactly one of FOLDER and --scene")
-    names = list(dict.fromkeys(named(["shunting", "occupancy"] if slam is None else slam)))
-    if not names:
-        raise InvalidValueError("--slam must name at least one SLAM")
-    check(names, *([scene] if scene else []))
-    from scripts.days import sessions as days
-    from scripts.days.buildings import FIRST
-    from scripts.pace import Work, announce, timed
-    from sim.recording.recipe import MAX_SECONDS, Recipe
 
-    if folder is not None:
-        count = len(days.recorded(folder))  # complains before anything is written
-        work = Work(f"lifelong, recorded, {' '.join(names)}", count)
-        announce(f"{count} sessions, {len(names)} SLAMs", [work])
-        if not plan_only:
+    folder: Path | None = argument("A dataset of [bold]mobilia generate --sessions[/bold].")
+    slam: list[str] | None = option(
+        "SLAMs: --slam A B C; default shunting occupancy.", complete=SLAMS
+    )
+    scene: str | None = option("Or a scene, whose sessions are simulated here.", complete=SCENES)
+    sessions: int = option("How many of them, the first included.", 11)
+    change: float = option("Share of things and doors put elsewhere between two sessions.", 0.3)
+    dynamism: float = option("How much the room moves in a session.", 0.5)
+    moves: options.Moves = part(options.Moves, without=("dynamism", "change"))
+    seconds: float = option("Length of a simulated session, s.", 60.0)
+    first_seconds: float | None = option(
+        "Of the first one, which maps the building; default three."
+    )
+    seed: int = option("Of the building.", 0)
+    scanner: str = options.SCANNER()
+    out: Path | None = option("Folder to write; default out/lifelong.", writes=True)
+    overwrite: bool = options.OVERWRITE()
+    plan_only: bool = options.PLAN()
+
+    def __call__(self) -> None:
+        options.exactly_one("FOLDER and --scene", self.folder, self.scene)
+        usual = ["shunting", "occupancy"]
+        names = list(dict.fromkeys(options.named(usual if self.slam is None else self.slam)))
+        if not names:
+            raise InvalidValueError("--slam must name at least one SLAM")
+        check(names, self.scene)
+        from scripts.days import sessions as days
+        from scripts.pace import Work, announce, timed
+
+        if self.folder is not None:
+            count = len(days.recorded(self.folder))  # complains before anything is written
+            work = Work(f"lifelong, recorded, {' '.join(names)}", count)
+            announce(f"{count} sessions, {len(names)} SLAMs", [work])
+            settings: dict[str, Any] = {"dataset": self.folder.name}
+            drives = days.read(self.folder)
+        else:
+            recipe, first_s = self._recipe(), self._first_s()
+            work = Work(f"lifelong {' '.join(names)}", first_s + self.seconds * (self.sessions - 1))
+            announce(f"{self.sessions} sessions of {self.scene}, {len(names)} SLAMs", [work])
+            drives = days.simulated(recipe, self.sessions, first_s)
+            settings = {
+                "scene": recipe.scene, "seed": recipe.seed, "dynamism": recipe.dynamism,
+                "motion": recipe.motion, "change": recipe.change, "sessions": self.sessions,
+                "seconds": recipe.seconds, "first_seconds": first_s,
+                "scanner": recipe.scanner, "options": dict(recipe.options),
+            }  # fmt: skip
+        if not self.plan_only:
             with timed(work):
-                _write(names, days.read(folder), {"dataset": folder.name}, out, overwrite)
-        return
-    assert scene is not None
-    recipe = Recipe(
-        scene=scene, seed=seed, dynamism=dynamism, motion=motion, change=change, seconds=seconds,
-        scanner=scanner, session=days.checked_count(sessions) - 1, options=options_with(crowd),
-    )  # fmt: skip
-    first_s = FIRST * seconds if first_seconds is None else first_seconds
-    if not 0.0 < first_s <= MAX_SECONDS:
-        raise InvalidValueError(
-            f"--first-seconds must be > 0 and at most {MAX_SECONDS:g}, got {first_s}"
-        )
-    work = Work(f"lifelong {' '.join(names)}", first_s + seconds * (sessions - 1))
-    announce(f"{sessions} sessions of {scene}, {len(names)} SLAMs", [work])
-    if plan_only:
-        return
-    with timed(work):
-        drives = days.simulated(recipe, sessions, first_s)
-        _write(names, drives, _settings(recipe, sessions, first_s), out, overwrite)
+                self._live(names, drives, settings)
 
+    def _recipe(self) -> "Recipe":
+        """Of the last session; ``InvalidValueError`` for what cannot be."""
+        from scripts.days.sessions import checked_count
+        from sim.recording.recipe import Recipe
 
-def _settings(recipe: "Recipe", sessions: int, first_seconds: float) -> dict[str, Any]:
-    return {
-        "scene": recipe.scene, "seed": recipe.seed, "dynamism": recipe.dynamism,
-        "motion": recipe.motion, "change": recipe.change, "sessions": sessions,
-        "seconds": recipe.seconds, "first_seconds": first_seconds,
-        "scanner": recipe.scanner, "options": dict(recipe.options),
-    }  # fmt: skip
-
-
-def _write(
-    names: list[str],
-    drives: "Iterator[Drive]",
-    settings: dict[str, Any],
-    out: Path | None,
-    overwrite: bool,
-) -> None:
-    from scripts.days import lifelong as life
-    from scripts.days import tables
-    from scripts.days.report import Changed, changes_of
-    from scripts.output import write_recipe
-    from scripts.pages.page import Page, Part, command, tell
-    from scripts.pages.page import write as write_page
-    from scripts.whole_folder import whole_folder
-
-    settings = {"slams": names, **settings}
-    path = out or Path("out") / "lifelong"
-    with whole_folder(path, overwrite=overwrite, command="lifelong", settings=settings) as folder:
-        buildings = life.started(names, folder)
-        (folder / "replays").mkdir()
-        for building in buildings:
-            building.replays = folder / "replays"
-        kept: dict[int, Drive] = {}
-        with working("living through the sessions"):
-            rows, aged = life.lived(buildings, _noted(drives, kept))
-        living = next((b for b in buildings if not b.anew), None)
-        changed = Changed() if living is None else changes_of(folder, living, kept)
-        tables.write(folder, rows, settings, changed.score, aged)
-        by_slam = {name: [row for row in rows if row["slam"] == name] for name in names}
-        said = {b.name: _sentence(b, by_slam[b.name], aged) for b in buildings}
-        lives = [
-            Part(
-                title=f"The life of {name}", note=said[name],
-                table=tables.printed(name, own, whole=True),
-            )
-            for name, own in by_slam.items()
-        ]  # fmt: skip
-        older = [Part(title="Older maps", table=tables.ages_table(aged))] if aged else []
-        first = names[0] if living is None else living.name
-        page = Page(
-            title=f"A building over {len(kept)} sessions",
-            said=[tables.last_session(by_slam[first], changed.said)],
-            parts=[*changed.parts, *lives, *older], settings=settings,
-            next={} if living is None else {
-                "A session of your own in this map:": command(
-                    "run", first, "--log", "LOG", "--map-in", path / living.map.name
-                )
-            },
+        assert self.scene is not None
+        return Recipe(
+            scene=self.scene, seed=self.seed, dynamism=self.dynamism, motion=self.moves.motion,
+            change=self.change, seconds=self.seconds, scanner=self.scanner,
+            session=checked_count(self.sessions) - 1,
+            options=options.options_with(self.moves.crowd),
         )  # fmt: skip
-        write_recipe(folder, "lifelong", settings)
-        write_page(folder, page)
-    for name, own in by_slam.items():
-        console.print(tables.printed(name, own))
-        say(escape(said[name]))
-    tell(path, page)
+
+    def _first_s(self) -> float:
+        """Length of the first session, s."""
+        from scripts.days.buildings import FIRST
+        from sim.recording.recipe import MAX_SECONDS
+
+        first_s = FIRST * self.seconds if self.first_seconds is None else self.first_seconds
+        if not 0.0 < first_s <= MAX_SECONDS:
+            raise InvalidValueError(
+                f"--first-seconds must be > 0 and at most {MAX_SECONDS:g}, got {first_s}"
+            )
+        return first_s
+
+    def _live(self, names: list[str], drives: "Iterator[Drive]", about: dict[str, Any]) -> None:
+        """Live it, write it, and say how it went."""
+        from scripts.days import lifelong as life
+        from scripts.days import tables
+        from scripts.days.report import Changed, changes_of
+        from scripts.output import write_recipe
+        from scripts.pages.page import Page, Part, command, tell
+        from scripts.pages.page import write as write_page
+        from scripts.whole_folder import whole_folder
+
+        settings = {"slams": names, **about}
+        path = self.out or Path("out") / "lifelong"
+        with whole_folder(
+            path, overwrite=self.overwrite, command="lifelong", settings=settings
+        ) as folder:
+            buildings = life.started(names, folder)
+            (folder / "replays").mkdir()
+            for building in buildings:
+                building.replays = folder / "replays"
+            kept: dict[int, Drive] = {}
+            with working("living through the sessions"):
+                rows, aged = life.lived(buildings, _noted(drives, kept))
+            living = next((b for b in buildings if not b.anew), None)
+            changed = Changed() if living is None else changes_of(folder, living, kept)
+            tables.write(folder, rows, settings, changed.score, aged)
+            by_slam = {name: [row for row in rows if row["slam"] == name] for name in names}
+            said = {b.name: _sentence(b, by_slam[b.name], aged) for b in buildings}
+            lives = [
+                Part(
+                    title=f"The life of {name}", note=said[name],
+                    table=tables.printed(name, own, whole=True),
+                )
+                for name, own in by_slam.items()
+            ]  # fmt: skip
+            older = [Part(title="Older maps", table=tables.ages_table(aged))] if aged else []
+            first = names[0] if living is None else living.name
+            page = Page(
+                title=f"A building over {len(kept)} sessions",
+                said=[tables.last_session(by_slam[first], changed.said)],
+                parts=[*changed.parts, *lives, *older], settings=settings,
+                next={} if living is None else {
+                    "A session of your own in this map:": command(
+                        "run", first, "--log", "LOG", "--map-in", path / living.map.name
+                    )
+                },
+            )  # fmt: skip
+            write_recipe(folder, "lifelong", settings)
+            write_page(folder, page)
+        for name, own in by_slam.items():
+            console.print(tables.printed(name, own))
+            say(escape(said[name]))
+        tell(path, page)
 
 
 def _sentence(building: "Building", rows: list[Row], aged: list[Row]) -> str:

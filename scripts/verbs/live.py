@@ -3,16 +3,15 @@
 
 import webbrowser
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
 from rich.markup import escape
 
 from scripts import options
 from scripts.console import note, say
 from scripts.live import FASTEST, SLOWEST
 from scripts.names import check
-from slam.errors import InvalidValueError
+from scripts.spec import SCENES, SLAMS, argument, option, part, spec
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
@@ -22,44 +21,8 @@ if TYPE_CHECKING:
 PORT = 8765
 
 
-def live(
-    scene: Annotated[
-        str | None, typer.Argument(help="A scene by name, or module:function.")
-    ] = None,
-    slam: Annotated[
-        list[str] | None,
-        typer.Option(help="SLAMs by name or module:Class: --slam A B C; default shunting."),
-    ] = None,
-    log: Annotated[Path | None, typer.Option(help="Instead of a scene: a log.")] = None,
-    bag: Annotated[Path | None, typer.Option(help="Instead of a scene: a bag of ROS.")] = None,
-    seconds: Annotated[float, typer.Option(help="How long the scene lives, s.")] = 3600.0,
-    dynamism: options.DynamismLevel = 0.5,
-    motion: options.Motion = None,
-    change: options.Change = None,
-    crowd: options.CrowdOption = None,
-    events: options.EventsOption = None,
-    robot: options.RobotOption = None,
-    seed: Annotated[int, typer.Option(help="Seed of the scene, whole number >= 0.")] = 0,
-    scanner: options.Scanner = "full",
-    paused: Annotated[bool, typer.Option("--paused", help="Wait for play.")] = False,
-    speed: Annotated[float, typer.Option(help="1 is real time.")] = 1.0,
-    host: Annotated[
-        str, typer.Option(help="Address to listen at; any but loopback lets others in.")
-    ] = "127.0.0.1",
-    port: Annotated[int, typer.Option(help="Port to listen at, 0 for any that is free.")] = PORT,
-    allow_origin: Annotated[
-        list[str] | None,
-        typer.Option(help="A web page that may connect: https://host[:port]; repeatable."),
-    ] = None,
-    browser: Annotated[
-        bool, typer.Option("--open", help="Open the page in this machine's browser, too.")
-    ] = False,
-    ros2: Annotated[
-        str | None,
-        typer.Option(help="The robot on a network of ROS 2 as well: dds or zenoh (docs/ros2.md)."),
-    ] = None,
-    set_: options.Set = None,
-) -> None:
+@spec
+class Live:
     """Open a page with a running world: watch it, drive in it, push its chairs.
 
     Any browser shows it, at http://127.0.0.1:8765. Ctrl-C ends it. Nothing is written.
@@ -68,35 +31,72 @@ def live(
 
     [bold]mobilia live --log intel.log.xz --slam shunting occupancy[/bold]
     """
-    path = _file(scene, log, bag)
-    if not 0 <= port <= 65535:
-        raise InvalidValueError(f"--port must lie in 0..65535, got {port}")
-    if not SLOWEST <= speed <= FASTEST:
-        raise InvalidValueError(f"--speed must lie in [{SLOWEST:g}, {FASTEST:g}], got {speed:g}")
-    slams = list(with_set(slam or ["shunting"], set_ or []))
-    check(slams, scene)
-    from scripts.live import served, session
 
-    allowed = [served.origin_of(text) for text in allow_origin or []]
-    served.require()
-    held = options.Held(motion=motion, change=change, crowd=crowd)
-    world = {**held.world(scene, dynamism, seed), "laser": scanner, **options.staged(events, robot)}
-    opener = session.Opener(
-        slams=slams, path=path, settings=world if path is None else {}, seconds=seconds
+    scene: str | None = argument("A scene by name, or module:function.", complete=SCENES)
+    slam: list[str] | None = option(
+        "SLAMs by name or module:Class: --slam A B C; default shunting.", complete=SLAMS
     )
-    network = None if ros2 is None else _network(ros2, is_log=path is not None)
-    _serve(
-        opener, (host, port), allowed, playing=not paused, speed=speed, browser=browser,
-        network=network,
-    )  # fmt: skip
+    log: Path | None = option("Instead of a scene: a log.")
+    bag: Path | None = option("Instead of a scene: a bag of ROS.")
+    seconds: float = option("How long the scene lives, s.", 3600.0)
+    moves: options.Moves = part(options.Moves)
+    staged: options.Staged = part(options.Staged)
+    seed: int = option("Seed of the scene, whole number >= 0.", 0)
+    scanner: str = options.SCANNER()
+    paused: bool = option("Wait for play.", False)
+    speed: float = option("1 is real time.", 1.0, span=(SLOWEST, FASTEST))
+    host: str = option("Address to listen at; any but loopback lets others in.", "127.0.0.1")
+    port: int = option("Port to listen at, 0 for any that is free.", PORT, span=(0, 65535))
+    allow_origin: list[str] | None = option(
+        "A web page that may connect: https://host[:port]; repeatable."
+    )
+    browser: bool = option("Open the page in this machine's browser, too.", False, "--open")
+    ros2: str | None = option(
+        "The robot on a network of ROS 2 as well: dds or zenoh (docs/ros2.md)."
+    )
+    set_: list[str] | None = options.SET()
 
+    def __call__(self) -> None:
+        options.exactly_one("a scene, --log and --bag", self.scene, self.log, self.bag)
+        path = self.log if self.log is not None else self.bag
+        slams = list(with_set(self.slam or ["shunting"], self.set_ or []))
+        check(slams, self.scene)
+        from scripts.live import served, session
 
-def _file(scene: str | None, log: Path | None, bag: Path | None) -> Path | None:
-    """The log or bag, None for a scene; one of the three must be named."""
-    given = [what for what in (scene, log, bag) if what is not None]
-    if len(given) != 1:
-        raise InvalidValueError("name exactly one of a scene, --log and --bag")
-    return log if log is not None else bag
+        allowed = [served.origin_of(text) for text in self.allow_origin or []]
+        served.require()
+        world = {
+            **self.moves.world(self.scene, self.seed), "laser": self.scanner,
+            **self.staged.settings(),
+        }  # fmt: skip
+        opener = session.Opener(
+            slams=slams, path=path, settings=world if path is None else {}, seconds=self.seconds
+        )
+        network = None if self.ros2 is None else _network(self.ros2, is_log=path is not None)
+        self.serve(opener, allowed, network)
+
+    def serve(self, opener: "Opener", origins: list[str], network: "Network | None" = None) -> None:
+        """The page, until something ends it."""
+        from scripts.live.view import View
+
+        view = View(
+            opener, (self.host, self.port), origins, playing=not self.paused, speed=self.speed,
+            network=network,
+        )  # fmt: skip
+        try:
+            if view.served.token:
+                note(
+                    f"--host {self.host}: whoever has the address below can watch, drive the robot "
+                    "and move things. There is no encryption."
+                )
+            url = f"http://{self.host}:{view.served.port}/{view.served.token}"
+            say(f"Open [bold]{escape(url)}[/bold] in a browser. Ctrl-C ends it.")
+            if self.browser:
+                webbrowser.open(url)
+            while True:
+                view.turn()
+        finally:
+            view.close()
 
 
 def _network(middleware: str, *, is_log: bool) -> "Network":
@@ -111,27 +111,3 @@ def _network(middleware: str, *, is_log: bool) -> "Network":
         f"{'' if is_log else ', drive it and move things'}."
     )
     return network
-
-
-def _serve(
-    opener: "Opener", address: tuple[str, int], origins: list[str], *, playing: bool, speed: float,
-    browser: bool = False, network: "Network | None" = None,
-) -> None:  # fmt: skip
-    from scripts.live.view import View
-
-    view = View(opener, address, origins, playing=playing, speed=speed, network=network)
-    try:
-        host, token = address[0], view.served.token
-        if token:
-            note(
-                f"--host {host}: whoever has the address below can watch, drive the robot and "
-                "move things. There is no encryption."
-            )
-        url = f"http://{host}:{view.served.port}/{token}"
-        say(f"Open [bold]{escape(url)}[/bold] in a browser. Ctrl-C ends it.")
-        if browser:
-            webbrowser.open(url)
-        while True:
-            view.turn()
-    finally:
-        view.close()

@@ -2,63 +2,59 @@
 """``mobilia report``: a comparison as one page."""
 
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
 from rich.markup import escape
 
 from scripts.console import fact, say, working
+from scripts.spec import REQUIRED, SLAMS, argument, option, spec
 
 if TYPE_CHECKING:
     from scripts.report.study import Study
 
 
-def report(
-    folder: Annotated[
-        Path, typer.Argument(help="Folder that mobilia compare wrote.", metavar="DIR")
-    ],
-    drive: Annotated[
-        list[Path] | None,
-        typer.Option(help="Folders that mobilia drive wrote; DIR/drive* need not be named."),
-    ] = None,
-    subject: Annotated[
-        str | None,
-        typer.Option(help="SLAM that the page is about; default the one named first."),
-    ] = None,
-    replays: Annotated[
-        bool,
-        typer.Option("--replays", help="Also DIR/replays: the subject's worst run of each scene."),
-    ] = False,
-) -> None:
+@spec
+class Report:
     """Write DIR/report.html: one page, self-contained, that opens from disk and prints.
 
     It begins with the answer, which is printed here too: from which level on the SLAM is lost.
 
     [bold]mobilia report out/compare --subject ekf[/bold]
     """
-    from scripts.closed_loop.tables import driven, drives_in
-    from scripts.output import locked_folder
-    from scripts.report import page
-    from scripts.report.answer import failed
-    from scripts.report.study import check_comparison, study
 
-    check_comparison(folder)
-    found = [*(drive or []), *drives_in(folder)]
-    about = study(folder, subject)
-    with locked_folder(folder, "compare"):
-        with working("drawing the page"):
-            path = page.write(about, [driven(one) for one in found])
-        for line in failed(about.compared.runs, about.axis):
-            fact(line, bad=True)
-        for line in page.answers(about):
-            fact(line)
-        for line in page.blame_worst(about):
-            say(f"What misled it: [bold]{escape(line)}[/bold]", highlight=False)
-        if replays:
-            with working("replaying the worst runs"):
-                made = _replays(about)
-            say(f"Wrote [bold]{escape(', '.join(made))}[/bold].")
-    say(f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).")
+    folder: Path = argument("Folder that mobilia compare wrote.", REQUIRED, metavar="DIR")
+    drive: list[Path] | None = option(
+        "Folders that mobilia drive wrote; DIR/drive* need not be named."
+    )
+    subject: str | None = option(
+        "SLAM that the page is about; default the one named first.", complete=SLAMS
+    )
+    replays: bool = option("Also DIR/replays: the subject's worst run of each scene.", False)
+
+    def __call__(self) -> None:
+        from scripts.closed_loop.tables import driven, drives_in
+        from scripts.output import locked_folder
+        from scripts.report import page
+        from scripts.report.answer import failed
+        from scripts.report.study import check_comparison, study
+
+        check_comparison(self.folder)
+        found = [*(self.drive or []), *drives_in(self.folder)]
+        about = study(self.folder, self.subject)
+        with locked_folder(self.folder, "compare"):
+            with working("drawing the page"):
+                path = page.write(about, [driven(one) for one in found])
+            for line in failed(about.compared.runs, about.axis):
+                fact(line, bad=True)
+            for line in page.answers(about):
+                fact(line)
+            for line in page.blame_worst(about):
+                say(f"What misled it: [bold]{escape(line)}[/bold]", highlight=False)
+            if self.replays:
+                with working("replaying the worst runs"):
+                    made = _replays(about)
+                say(f"Wrote [bold]{escape(', '.join(made))}[/bold].")
+        say(f"Open [bold]{escape(str(path))}[/bold] ({path.stat().st_size / 1e6:.1f} MB).")
 
 
 def _replays(about: "Study") -> list[str]:

@@ -5,54 +5,57 @@ import importlib
 import os
 from collections.abc import Callable
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
-import typer
 from rich.markup import escape
 
 from scripts.console import note, say
 from scripts.paper import EXPERIMENTS
+from scripts.spec import REQUIRED, argument, names_of, option, spec
 from slam.errors import UnknownNameError
 
 if TYPE_CHECKING:
     from scripts.paper.runs import Plan
 
 
-def reproduce(
-    what: Annotated[
-        list[str], typer.Argument(help=f"Of {', '.join(EXPERIMENTS)}, or all.", metavar="WHAT...")
-    ],
-    quick: Annotated[
-        bool, typer.Option("--quick", help="Short runs, of one seed: three minutes for all.")
-    ] = False,
-    seeds: Annotated[
-        int | None, typer.Option(help="Runs of each simulated experiment.", show_default="20")
-    ] = None,
-    out: Annotated[Path, typer.Option(help="Folder; each experiment gets one in it.")] = Path(
-        "out/reproduce"
-    ),
-    data: Annotated[Path | None, typer.Option(help="Folder of the Victoria Park dataset.")] = None,
-    jobs: Annotated[int, typer.Option(help="Processes; 0: one for each core.")] = 0,
-) -> None:
+@spec
+class Reproduce:
     """Reproduce the paper's experiments: figures, tables with its numbers beside ours, recipes.
 
     Finished runs are kept: if it is killed, the same command continues.
 
     [bold]mobilia reproduce landmarks[/bold]
     """
-    names = _named(what)
-    from scripts.paper.runs import Plan
 
-    plan = Plan(out=out, seeds=seeds, quick=quick, data=data, processes=jobs or os.cpu_count() or 1)
-    left_out = "all" in what and plan.data is None
-    if left_out:
-        names.remove("victoria-park")
-    for name in names:
-        experiment(name)(plan)
-        page = escape(str(plan.out / name / "README.md"))
-        say(f"[bold]{name}[/bold]: open {page}")
-    if left_out:
-        note("victoria-park is left out: pass --data with the folder of the dataset")
+    what: list[str] = argument(
+        f"Of {', '.join(EXPERIMENTS)}, or all.", REQUIRED, metavar="WHAT...",
+        complete=names_of("scripts.paper:EXPERIMENTS"),
+    )  # fmt: skip
+    quick: bool = option("Short runs, of one seed: three minutes for all.", False)
+    seeds: int | None = option("Runs of each simulated experiment.", show_default="20")
+    out: Path = option(
+        "Folder; each experiment gets one in it.", Path("out/reproduce"), writes=True
+    )
+    data: Path | None = option("Folder of the Victoria Park dataset.")
+    jobs: int = option("Processes; 0: one for each core.", 0)
+
+    def __call__(self) -> None:
+        names = _named(self.what)
+        from scripts.paper.runs import Plan
+
+        plan = Plan(
+            out=self.out, seeds=self.seeds, quick=self.quick, data=self.data,
+            processes=self.jobs or os.cpu_count() or 1,
+        )  # fmt: skip
+        left_out = "all" in self.what and plan.data is None
+        if left_out:
+            names.remove("victoria-park")
+        for name in names:
+            experiment(name)(plan)
+            page = escape(str(plan.out / name / "README.md"))
+            say(f"[bold]{name}[/bold]: open {page}")
+        if left_out:
+            note("victoria-park is left out: pass --data with the folder of the dataset")
 
 
 def experiment(name: str) -> "Callable[[Plan], None]":

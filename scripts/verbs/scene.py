@@ -1,187 +1,201 @@
 # SPDX-License-Identifier: Apache-2.0
 """``mobilia scene``: make a scene of a map or a log, show it, check it."""
 
+import math
+from functools import partial
 from pathlib import Path
-from typing import Annotated
+from typing import TYPE_CHECKING, Any
 
 import typer
 
+from scripts import options
 from scripts.console import fact, note, say, working
 from scripts.names import check as check_names
 from scripts.names import file_name, run_name
 from scripts.option_names import Verb
-from scripts.options import Overwrite, Seed, Strict
+from scripts.spec import REQUIRED, SLAMS, argument, command, option, part, spec
 from slam.errors import InvalidValueError, MobiliaError
+
+if TYPE_CHECKING:
+    from scenes.from_map import FromMap
+    from slam.estimate import Raster
 
 scene = typer.Typer(help="Make a scene of a map or a log, show it, check it.", no_args_is_help=True)
 
-Furniture = Annotated[
-    str, typer.Option(help="Small things of the map: move (they can be pushed), keep, drop.")
-]
-Doors = Annotated[
-    str, typer.Option(help="Doors in gaps of 0.7 to 1.2 m: none, open, ajar, closed, mixed.")
-]
-Tolerance = Annotated[
-    float, typer.Option(help="m by which a straightened wall may miss the middle of its cells.")
-]
-Out = Annotated[Path | None, typer.Option(help="STEM of STEM.toml, .xml and .png.")]
-Start = Annotated[
-    str | None, typer.Option(help="Where the robot starts in the map: x,y or x,y,degrees.")
-]
-Which = Annotated[str, typer.Argument(help="A scene by name, module:function, or its file.")]
+OUT = partial(option, "STEM of STEM.toml, .xml and .png.", writes=True)
+WHICH = partial(argument, "A scene by name, module:function, or its file.", REQUIRED)
+TOLERANCE = partial(option, "m by which a straightened wall may miss the middle of its cells.")
 
 
-@scene.command("from-map", cls=Verb)
-def from_map(
-    map_yaml: Annotated[
-        Path, typer.Argument(help="A map_server YAML file, its PGM or PNG beside it.")
-    ],
-    out: Out = None,
-    furniture: Furniture = "move",
-    doors: Doors = "none",
-    start: Start = None,
-    tolerance: Tolerance = 0.05,
-    overwrite: Overwrite = False,
-) -> None:
+@spec
+class Parts:
+    """What is made of the small things of a map, and of its gaps."""
+
+    furniture: str = option(
+        "Small things of the map: move (they can be pushed), keep, drop.", "move",
+        choices=("move", "keep", "drop"),
+    )  # fmt: skip
+    doors: str = option(
+        "Doors in gaps of 0.7 to 1.2 m: none, open, ajar, closed, mixed.", "none",
+        choices=("none", "open", "ajar", "closed", "mixed"),
+    )  # fmt: skip
+
+    def make(self, map_: "Raster", how: "FromMap", stem: Path, **more: Any) -> None:
+        """The scene's files; say what is in them."""
+        from scripts.scene import make
+
+        with working("finding walls and rooms"):
+            done = make.made(map_, how, stem, furniture=self.furniture, doors=self.doors, **more)
+        for line in make.in_words(done.plan):
+            say(line, highlight=False)
+        toml, xml, picture = done.files
+        note(f"wrote {toml} (the scene's name), {xml} (walls and rooms) and {picture}")
+
+
+@spec
+class OfMap:
     """Make a scene of a map: a plan in MJCF, a recipe in TOML, a picture.
 
     [bold]mobilia scene from-map map.yaml[/bold]
     """
-    _check_choices(furniture, doors)
-    from scenes.from_map import FromMap
-    from scripts.scene import make
 
-    options = FromMap(tolerance_m=tolerance, start=_start(start))
-    with working(f"reading {map_yaml.name}"):
-        raster = make.of_file(map_yaml)
-    with working("finding walls and rooms"):
-        done = make.made(
-            raster, options, out or Path(map_yaml.stem), source=map_yaml.name,
-            furniture=furniture, doors=doors, overwrite=overwrite,
+    map_yaml: Path = argument("A map_server YAML file, its PGM or PNG beside it.", REQUIRED)
+    out: Path | None = OUT()
+    parts: Parts = part(Parts)
+    start: str | None = option("Where the robot starts in the map: x,y or x,y,degrees.")
+    tolerance: float = TOLERANCE(0.05)
+    overwrite: bool = options.OVERWRITE()
+
+    def __call__(self) -> None:
+        from scenes.from_map import FromMap
+        from scripts.scene.make import of_file
+
+        how = FromMap(tolerance_m=self.tolerance, start=_start(self.start))
+        with working(f"reading {self.map_yaml.name}"):
+            raster = of_file(self.map_yaml)
+        self.parts.make(
+            raster, how, self.out or Path(self.map_yaml.stem), source=self.map_yaml.name,
+            overwrite=self.overwrite,
         )  # fmt: skip
-    _tell(done)
 
 
-@scene.command("from-log", cls=Verb)
-def from_log(
-    log: Annotated[Path, typer.Argument(help="A log, as for mobilia run --log.")],
-    out: Out = None,
-    slam: Annotated[str, typer.Option(help="The SLAM that makes the map.")] = "shunting",
-    furniture: Furniture = "move",
-    doors: Doors = "none",
-    tolerance: Tolerance = 0.05,
-    strict: Strict = False,
-    overwrite: Overwrite = False,
-) -> None:
+@spec
+class OfLog:
     """Make a scene of the map that a SLAM makes of a log; the robot starts where the log did.
 
     [bold]mobilia scene from-log intel.log[/bold]
     """
-    _check_choices(furniture, doors)
-    check_names([slam])
-    from scenes.from_map import FromMap
-    from scripts.scene import make
 
-    with working(f"{slam} maps {log.name}"):
-        raster, poses = make.of_log(log, slam, strict=strict)
-    first = (float(poses[0, 0]), float(poses[0, 1]), float(poses[0, 2]))
-    options = FromMap(tolerance_m=tolerance, start=first, path=poses[:, :2])
-    with working("finding walls and rooms"):
-        done = make.made(
-            raster, options, out or Path(run_name(log)), source=log.name,
-            furniture=furniture, doors=doors, overwrite=overwrite,
+    log: Path = argument("A log, as for mobilia run --log.", REQUIRED)
+    out: Path | None = OUT()
+    slam: str = option("The SLAM that makes the map.", "shunting", complete=SLAMS)
+    parts: Parts = part(Parts)
+    tolerance: float = TOLERANCE(0.05)
+    strict: bool = options.STRICT()
+    overwrite: bool = options.OVERWRITE()
+
+    def __call__(self) -> None:
+        check_names([self.slam])
+        from scenes.from_map import FromMap
+        from scripts.scene.make import of_log
+
+        with working(f"{self.slam} maps {self.log.name}"):
+            raster, poses = of_log(self.log, self.slam, strict=self.strict)
+        x, y, heading = poses[0].tolist()
+        how = FromMap(tolerance_m=self.tolerance, start=(x, y, heading), path=poses[:, :2])
+        self.parts.make(
+            raster, how, self.out or Path(run_name(self.log)), source=self.log.name,
+            overwrite=self.overwrite,
         )  # fmt: skip
-    _tell(done)
 
 
-@scene.command("show", cls=Verb)
-def show(which: Which, out: Out = None, seed: Seed = 0, width: int = 1600) -> None:
+@spec
+class Show:
     """Draw a scene from above, and list what stands and what moves.
 
     [bold]mobilia scene show lab.toml[/bold]
     """
-    check_names([], which)
-    import imageio.v2 as imageio
 
-    import scenes
-    from scripts.scene.make import contents
-    from sim.view.mapview import MapView
-    from slam.files import replacing
+    which: str = WHICH()
+    out: Path | None = OUT()
+    seed: int = options.SEED(0)
+    width: int = option("", 1600)
 
-    built = scenes.build(which, seed)
-    a, b, c, d = built.bounds
-    height = max(200, min(4096, round(width * (d - b + 1.0) / (c - a + 0.6))))
-    path = (out or Path(f"{file_name(Path(which).stem)}-seen")).with_suffix(".png")
-    picture = MapView(built, width, height).draw([built.initial[m.name] for m in built.movers])
-    with replacing(path) as new:
-        imageio.imwrite(new, picture, format="png")
-    for line in contents(built):
-        say(line, highlight=False)
-    note(f"wrote {path}")
+    def __call__(self) -> None:
+        check_names([], self.which)
+        import scenes
+        from scripts.scene.make import contents
+        from sim.view.mapview import MapView
+
+        built = scenes.build(self.which, self.seed)
+        a, b, c, d = built.bounds
+        height = max(200, min(4096, round(self.width * (d - b + 1.0) / (c - a + 0.6))))
+        path = (self.out or Path(f"{file_name(Path(self.which).stem)}-seen")).with_suffix(".png")
+        view = MapView(built, self.width, height)
+        picture = view.draw([built.initial[mover.name] for mover in built.movers])
+        for line in contents(built):
+            say(line, highlight=False)
+        _draw(path, picture)
 
 
-@scene.command("check", cls=Verb)
-def check(which: Which, seed: Seed = 0) -> None:
+@spec
+class Check:
     """Say what is wrong with a scene, by file and mark; one scan of it is simulated.
 
     [bold]mobilia scene check lab.toml[/bold]
     """
-    check_names([], which)
-    import scenes
-    from scripts.scene.make import problems
-    from sim.simulation import Simulation
 
-    Simulation(which, seed=seed).observe()  # raises what ``run`` would
-    found = list(problems(scenes.build(which, seed)))
-    for problem in found:
-        fact(f"{which}: {problem}", bad=True)
-    if found:
-        raise MobiliaError(f"{which}: {len(found)} things are wrong")
-    note(f"{which}: nothing is wrong")
+    which: str = WHICH()
+    seed: int = options.SEED(0)
+
+    def __call__(self) -> None:
+        check_names([], self.which)
+        import scenes
+        from scripts.scene.make import problems
+        from sim.simulation import Simulation
+
+        Simulation(self.which, seed=self.seed).observe()  # raises what ``run`` would
+        found = list(problems(scenes.build(self.which, self.seed)))
+        for problem in found:
+            fact(f"{self.which}: {problem}", bad=True)
+        if found:
+            raise MobiliaError(f"{self.which}: {len(found)} things are wrong")
+        note(f"{self.which}: nothing is wrong")
 
 
-@scene.command("kinds", cls=Verb)
-def kinds(
-    out: Annotated[Path | None, typer.Option(help="Also draw them all here, a PNG.")] = None,
-) -> None:
+@spec
+class Kinds:
     """List the kinds of furniture that a scene's file may put.
 
     [bold]mobilia scene kinds --out kinds.png[/bold]
     """
-    from scripts.scene.make import kinds as known
-    from scripts.scene.make import picture
 
-    stands, moves = known()
-    say(f"stands: {', '.join(stands)}", highlight=False)
-    say(f"can be pushed: {', '.join(moves)}", highlight=False)
-    if out is not None:
-        import imageio.v2 as imageio
+    out: Path | None = option("Also draw them all here, a PNG.", writes=True)
 
-        from slam.files import replacing
+    def __call__(self) -> None:
+        from scripts.scene.make import kinds, picture
 
-        path = out.with_suffix(".png")
-        with replacing(path) as new:
-            imageio.imwrite(new, picture(), format="png")
-        note(f"wrote {path}")
+        stands, moves = kinds()
+        say(f"stands: {', '.join(stands)}", highlight=False)
+        say(f"can be pushed: {', '.join(moves)}", highlight=False)
+        if self.out is not None:
+            _draw(self.out.with_suffix(".png"), picture())
 
 
-def _tell(done: object) -> None:
-    from scripts.scene import make
-
-    assert isinstance(done, make.Made)
-    for line in make.in_words(done.plan):
-        say(line, highlight=False)
-    toml, xml, picture = done.files
-    note(f"wrote {toml} (the scene's name), {xml} (walls and rooms) and {picture}")
+SPECS = {"from-map": OfMap, "from-log": OfLog, "show": Show, "check": Check, "kinds": Kinds}
+for _name, _spec in SPECS.items():
+    scene.command(_name, cls=Verb)(command(_spec))
 
 
-def _check_choices(furniture: str, doors: str) -> None:
-    for name, value, known in (
-        ("--furniture", furniture, ("move", "keep", "drop")),
-        ("--doors", doors, ("none", "open", "ajar", "closed", "mixed")),
-    ):
-        if value not in known:
-            raise InvalidValueError(f"{name} must be one of {', '.join(known)}, got {value!r:.80}")
+def _draw(path: Path, picture: Any) -> None:
+    """A PNG, whole or not at all."""
+    import imageio.v2 as imageio
+
+    from slam.files import replacing
+
+    with replacing(path) as new:
+        imageio.imwrite(new, picture, format="png")
+    note(f"wrote {path}")
 
 
 def _start(words: str | None) -> tuple[float, float, float] | None:
@@ -193,6 +207,4 @@ def _start(words: str | None) -> tuple[float, float, float] | None:
         numbers = []
     if len(numbers) not in (2, 3) or not all(abs(n) < 1e5 for n in numbers):
         raise InvalidValueError(f"--start must be x,y or x,y,degrees, got {words!r:.80}")
-    import math
-
     return numbers[0], numbers[1], math.radians(numbers[2]) if len(numbers) == 3 else 0.0

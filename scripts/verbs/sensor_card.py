@@ -2,29 +2,15 @@
 """``mobilia sensor-card``: a simulated scanner beside its data sheet, or beside a real log."""
 
 from pathlib import Path
-from typing import Annotated
-
-import typer
 
 from scripts.console import console, note, working
-from scripts.options import Strict, TextFormat
+from scripts.options import Recorded
+from scripts.spec import SCANNERS, option, part, spec
 from slam.errors import MobiliaError
 
 
-def sensor_card(
-    out: Annotated[
-        Path | None, typer.Option(help="Also write sensor_card.md and pictures/ into this folder.")
-    ] = None,
-    scanner: Annotated[
-        str, typer.Option(help="Which one, by name: utm30lx, tim561, ... (mobilia list).")
-    ] = "lms221",
-    log: Annotated[
-        list[Path] | None,
-        typer.Option(help="A real log to set it beside; several are taken for one scanner's."),
-    ] = None,
-    text_format: TextFormat = None,
-    strict: Strict = False,
-) -> None:
+@spec
+class SensorCard:
     """Measure a simulated scanner against its data sheet, or with --log beside a real one.
 
     The LMS-221's page has figures; that of another scanner is sensor_card_NAME.md. With --log,
@@ -34,14 +20,30 @@ def sensor_card(
     [bold]mobilia sensor-card --scanner utm30lx[/bold]
     [bold]mobilia sensor-card --log robot.log[/bold]
     """
-    if out is not None:
-        from slam.files import refuse_links
 
-        refuse_links(out / "pictures", out / "results")
-    if log:
-        beside_log(log, scanner, out, text_format=text_format, strict=strict)
-        return
-    beside_sheet(scanner, out)
+    out: Path | None = option(
+        "Also write sensor_card.md and pictures/ into this folder.", writes=True
+    )
+    scanner: str = option(
+        "Which one, by name: utm30lx, tim561, ... (mobilia list).", "lms221", complete=SCANNERS
+    )
+    log: list[Path] | None = option(
+        "A real log to set it beside; several are taken for one scanner's."
+    )
+    recorded: Recorded = part(Recorded, without=("laser", "flip"))
+
+    def __call__(self) -> None:
+        if self.out is not None:
+            from slam.files import refuse_links
+
+            refuse_links(self.out / "pictures", self.out / "results")
+        if not self.log:
+            beside_sheet(self.scanner, self.out)
+            return
+        beside_log(
+            self.log, self.scanner, self.out, text_format=self.recorded.text_format,
+            strict=self.recorded.strict,
+        )  # fmt: skip
 
 
 def beside_sheet(scanner: str, out: Path | None) -> None:

@@ -3,13 +3,14 @@
 
 import secrets
 from pathlib import Path
-from typing import TYPE_CHECKING, Annotated
+from typing import TYPE_CHECKING
 
 import typer
 
-from scripts import interrupt
+from scripts import interrupt, options
 from scripts.console import console, fail, plain, progress, say, working
-from scripts.options import Trust, admitted
+from scripts.options import admitted
+from scripts.spec import REQUIRED, SLAMS, argument, option, spec
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -20,30 +21,8 @@ _COLORS = {
 }  # fmt: skip
 
 
-def verify(
-    folder: Annotated[
-        Path,
-        typer.Argument(
-            help="A dataset, an episode, a folder of run, demo, compare, benchmark, drive or "
-            "blame, a map, or a submission to the benchmark."
-        ),
-    ],
-    regenerate_: Annotated[
-        int, typer.Option("--regenerate", help="Simulate this many episodes again and compare.")
-    ] = 0,
-    rerun: Annotated[
-        int,
-        typer.Option(help="Of a submission: also run its SLAM on this many, compare its poses."),
-    ] = 0,
-    slam: Annotated[
-        str | None, typer.Option(help="The SLAM to --rerun; default the one that the file names.")
-    ] = None,
-    seed: Annotated[
-        int | None,
-        typer.Option(help="Which ones: seed of that choice; default 0, of a submission by chance."),
-    ] = None,
-    trust: Trust = False,
-) -> None:
+@spec
+class Verify:
     """Check every file by its hash; with --regenerate also make episodes again.
 
     Exit status: 0 all well. 1 damaged: a file is not what it was, or an episode comes out otherwise
@@ -57,46 +36,62 @@ def verify(
     submitter's word. --rerun also runs its SLAM, which must be installed here, on recordings drawn
     by --seed.
     """
-    if min(regenerate_, rerun, seed or 0) < 0:
-        raise InvalidValueError("--regenerate, --rerun and --seed must be >= 0")
-    from scripts.results import check
 
-    with working("checking every file"):
-        findings = check(folder)
-    checked = len(findings)
-    submitted = folder.suffix == ".json" and folder.is_file()
-    if not submitted and (rerun or slam):
-        raise InvalidValueError("--rerun and --slam are for a submission")
-    if slam is not None and not rerun:
-        raise InvalidValueError("--slam is the SLAM to --rerun: say how many runs")
-    if submitted and findings[0].ok:
-        seed = _by_chance(regenerate_ or rerun) if seed is None else seed
-        findings += _of_submission(folder, regenerate_, rerun, seed, slam, trust)
-    elif regenerate_:
-        findings += _made_again(_drawn(_sound(folder, findings), regenerate_, seed or 0), trust)
-    for finding in findings:
-        _tell(finding)
-    _exit_if_bad(findings)
-    if submitted:
-        console.print(_judgement(len(findings) - checked, rerun))
-        return
-    console.print(f"{checked} checked, {len(findings) - checked} of them made again: all well")
+    folder: Path = argument(
+        "A dataset, an episode, a folder of run, demo, compare, benchmark, drive or "
+        "blame, a map, or a submission to the benchmark.",
+        REQUIRED,
+    )
+    regenerate: int = option("Simulate this many episodes again and compare.", 0)
+    rerun: int = option("Of a submission: also run its SLAM on this many, compare its poses.", 0)
+    slam: str | None = option(
+        "The SLAM to --rerun; default the one that the file names.", complete=SLAMS
+    )
+    seed: int | None = option(
+        "Which ones: seed of that choice; default 0, of a submission by chance."
+    )
+    trust: bool = options.TRUST()
 
+    def __call__(self) -> None:
+        if min(self.regenerate, self.rerun, self.seed or 0) < 0:
+            raise InvalidValueError("--regenerate, --rerun and --seed must be >= 0")
+        from scripts.results import check
 
-def _of_submission(
-    path: Path, regenerate_: int, rerun: int, seed: int, slam: str | None, trust: bool
-) -> "list[Finding]":
-    """A finding for each of its runs that was made again."""
-    from scripts.benchmark import submission
-    from scripts.benchmark.submission import made_again
-    from slam.names import NameFromFile
+        with working("checking every file"):
+            findings = check(self.folder)
+        checked = len(findings)
+        submitted = self.folder.suffix == ".json" and self.folder.is_file()
+        if not submitted and (self.rerun or self.slam):
+            raise InvalidValueError("--rerun and --slam are for a submission")
+        if self.slam is not None and not self.rerun:
+            raise InvalidValueError("--slam is the SLAM to --rerun: say how many runs")
+        if submitted and findings[0].ok:
+            findings += self._of_submission()
+        elif self.regenerate:
+            drawn = _drawn(_sound(self.folder, findings), self.regenerate, self.seed or 0)
+            findings += _made_again(drawn, self.trust)
+        for finding in findings:
+            _tell(finding)
+        _exit_if_bad(findings)
+        again = len(findings) - checked
+        if submitted:
+            console.print(_judgement(again, self.rerun))
+        else:
+            console.print(f"{checked} checked, {again} of them made again: all well")
 
-    given = submission.read(path)
-    runs = None
-    if rerun:
-        named = NameFromFile(given.slam, path)
-        runs = admitted(named, "SLAM", trust) if slam is None else slam
-    return list(made_again(path, rerun or regenerate_, seed, runs))
+    def _of_submission(self) -> "list[Finding]":
+        """A finding for each of its runs that was made again."""
+        from scripts.benchmark import submission
+        from scripts.benchmark.submission import made_again
+        from slam.names import NameFromFile
+
+        count = self.rerun or self.regenerate
+        seed = _by_chance(self.regenerate or self.rerun) if self.seed is None else self.seed
+        given = submission.read(self.folder)
+        runs = self.slam
+        if self.rerun and runs is None:
+            runs = admitted(NameFromFile(given.slam, self.folder), "SLAM", self.trust)
+        return list(made_again(self.folder, count, seed, runs))
 
 
 def _by_chance(count: int) -> int:

@@ -34,7 +34,7 @@ IMPORTERS = {
     "scripts/workers.py": "Dask",
     "scripts/benches/against.py": "ir-sim, by a constant",
     "scripts/cli.py": "verbs of ours, by constants",
-    "scripts/option_names.py": "names to complete, by constants",
+    "scripts/spec.py": "names to complete, by constants",
     "slam/ros/link.py": "the two middlewares, by constants",
     "slam/settings.py": "homes of constants, by constants",
     "scripts/live/served.py": "viser, and what its messages are read with, by constants",

@@ -19,13 +19,11 @@ from scripts.comparison.make import carry_out
 from scripts.comparison.plan import Plan
 from scripts.debugger.recording import Case, Checkpoint, record
 from scripts.film.footage import open_run, title_of
-from scripts.options import Axis, Held, axis_levels, every_of
+from scripts.options import Axis, Levels, Moves, every_of
 from scripts.report.study import study
 from scripts.results import check
 from sim.core.dynamism import Dynamism
 from sim.loop import LoopConfig
-from sim.recording.dataset import Plan as DatasetPlan
-from sim.recording.dataset import read_plan, writing
 from sim.recording.recipe import RECIPE, Recipe, read_recipe, write_recipe
 from sim.sensors.lidar.registry import scanner_of
 from sim.twins.absence import Change
@@ -66,38 +64,39 @@ def test_a_crowd_is_an_option_of_the_scene_and_checked():
             Recipe(**ONE, options={"crowd": wrong})
 
 
-def test_a_dataset_of_one_motion_reads_back_and_sweeps_change(tmp_path: Path):
-    plan = DatasetPlan(recipe=Recipe(**ONE, motion=0.25), dynamisms=(0.0, 1.0), episodes=1)
-    assert list(plan.planned()) == ["arena-d0-m0.25-s0001", "arena-d1-m0.25-s0001"]
-    with writing(tmp_path, plan):
-        assert read_plan(tmp_path) == plan
-
-
 def test_the_axis_is_what_has_several_levels():
-    assert axis_levels(["0", "1"], None, None) == ("dynamism", (0.0, 1.0), {})
-    assert axis_levels(["0", "1"], None, ["0.2"]) == ("dynamism", (0.0, 1.0), {"change": 0.2})
-    assert axis_levels(None, ["0:1:1"], None) == ("motion", (0.0, 1.0), {})
-    assert axis_levels(None, ["0.3"], ["0", "1"]) == ("change", (0.0, 1.0), {"motion": 0.3})
-    assert axis_levels(None, None, ["0.4"]) == ("change", (0.4,), {})
-    assert axis_levels(None, ["0.8"], None, ["0", "4"]) == ("people", (0.0, 4.0), {"motion": 0.8})
+    for given, axis, levels, held in (
+        ({"dynamism": ["0", "1"]}, "dynamism", (0.0, 1.0), {}),
+        ({"dynamism": ["0", "1"], "change": ["0.2"]}, "dynamism", (0.0, 1.0), {"change": 0.2}),
+        ({"motion": ["0:1:1"]}, "motion", (0.0, 1.0), {}),
+        ({"motion": ["0.3"], "change": ["0", "1"]}, "change", (0.0, 1.0), {"motion": 0.3}),
+        ({"change": ["0.4"]}, "change", (0.4,), {}),
+        ({"motion": ["0.8"], "people": ["0", "4"]}, "people", (0.0, 4.0), {"motion": 0.8}),
+        ({"dynamism": ["0:1:0.25"]}, "dynamism", (0.0, 0.25, 0.5, 0.75, 1.0), {}),
+        ({"dynamism": ["0.1:0.35:0.1"]}, "dynamism", (0.1, 0.2, 0.3), {}),
+        ({}, "dynamism", (0.0, 0.25, 0.5, 0.75, 1.0), {}),
+    ):
+        wanted = {"axis": axis, "levels": levels, **held, "crowd": None}
+        assert Levels(**given).of_plan() == wanted
     assert Axis(name="people").at(4.0) == {"dynamism": 0.0, "motion": 0.5, "change": None}
-    assert Axis(name="people").crowd(4.0) == "escorts:4"
+    assert Axis(name="people").crowd_at(4.0) == "escorts:4"
     for level in (1.5, -1.0):
         with pytest.raises(InvalidValueError, match=f"--people must be .*0..80, got {level:g}"):
-            Axis(name="people").crowd(level)
+            Axis(name="people").crowd_at(level)
 
 
 def test_levels_of_one_axis_leave_the_other_at_0_or_as_it_is_held():
     rates = [Dynamism.of(**Axis(name=name).at(1.0)) for name in ("dynamism", "motion", "change")]
     assert [(r.crowd, r.change) for r in rates] == [(1.0, 1.0), (1.0, 0.0), (0.0, 1.0)]
     assert rates[1].door_rate > 0.0 == rates[2].door_rate
-    held = Dynamism.of(**Axis(name="change", held=Held(motion=0.5)).at(1.0))
+    held = Dynamism.of(**Axis(name="change", motion=0.5).at(1.0))
     assert (held.crowd, held.change) == (0.5, 1.0)
-    for wrong in (lambda: Held(motion=1.5), lambda: Held(crowd="dragons:1")):
-        with pytest.raises(InvalidValueError):
-            wrong()
+    for wrong in ({"motion": 1.5}, {"crowd": "dragons:1"}):
+        for refuse in (lambda w: Axis(**w), lambda w: Moves(**w).world("arena", 0)):
+            with pytest.raises(InvalidValueError):
+                refuse(wrong)
     with pytest.raises(InvalidValueError, match="cannot be held"):
-        Axis(name="change", held=Held(change=0.5))
+        Axis(name="change", change=0.5)
 
 
 @pytest.mark.slow
@@ -180,14 +179,6 @@ def test_a_run_keeps_its_scanner_in_the_recipe_and_is_filmed_with_it(tmp_path: P
         assert footage.stream.metadata.laser == scanner_of("tim561").spec(
             footage.stream.metadata.laser.T_robot_laser
         )
-
-
-def test_plans_take_names_and_refuse_what_is_none() -> None:
-    some = {"slams": ("odometry",), "scenes": ("arena",), "levels": (0.0,), "seeds": (1,)}
-    plan = Plan(**some, seconds=10.0, every=1, scanner="rplidar_a1:noise")
-    assert plan.recipe(plan.runs()[0]).laser() == scanner_of("rplidar_a1:noise")
-    with pytest.raises(InvalidValueError, match=r"one scan in 8 of 5\.5 a second has 1"):
-        Plan(**some, seconds=1.0, every=8, scanner="rplidar_a1")
 
 
 def test_slams_get_about_as_many_scans_a_second_of_each() -> None:

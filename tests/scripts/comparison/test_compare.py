@@ -18,6 +18,7 @@ from scripts.comparison import folder, make, tables
 from scripts.comparison.plan import Plan
 from scripts.comparison.rules import Table, number, word
 from scripts.option_names import Verb
+from scripts.spec import command
 from scripts.verbs import compare as verb
 from slam import Estimate, Trajectory, se2, system
 from slam.errors import LogFormatError, OutputError
@@ -166,7 +167,7 @@ def test_killed_and_resumed_and_one_slam_more(tmp_path):
 def test_the_command_line_of_the_readme(monkeypatch):
     seen = {}
     app = typer.Typer()
-    app.command(cls=Verb)(verb.compare)
+    app.command(cls=Verb)(command(verb.Compare))
 
     def carry_out(plan, out, **ways):
         seen.update(plan=plan, out=out, ways=ways)

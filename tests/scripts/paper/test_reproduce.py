@@ -12,8 +12,8 @@ from scipy.io import savemat
 from scripts.paper.census import Census
 from scripts.paper.report import below_printed
 from scripts.paper.runs import Plan, statistics
-from scripts.verbs.reproduce import EXPERIMENTS, experiment
-from scripts.verbs.reproduce import reproduce as verb
+from scripts.spec import command
+from scripts.verbs.reproduce import EXPERIMENTS, Reproduce, experiment
 from slam import se2
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 from slam.logs.victoria_graph import read_graph, stamped
@@ -71,7 +71,7 @@ def park(tmp_path_factory) -> Path:
 def test_quick_leaves_pages_figures_and_recipes_of_all_and_closes_the_synthetic_park(
     tmp_path, park, capsys
 ):
-    verb(["all"], quick=True, data=park, out=tmp_path, jobs=1)
+    command(Reproduce)(["all"], quick=True, data=park, out=tmp_path, jobs=1)
     for name in EXPERIMENTS:
         whole(tmp_path / name)
     assert "theory" in capsys.readouterr().out
@@ -109,7 +109,7 @@ def test_without_the_data_it_says_where_to_get_it(tmp_path):
     with pytest.raises(InvalidValueError, match="--data must be the folder"):
         Plan(out=tmp_path, data=tmp_path / "features_trees.mat")
     with pytest.raises(UnknownNameError, match="no experiment is called 'nonsense'"):
-        verb(["nonsense"], out=tmp_path)
+        command(Reproduce)(["nonsense"], out=tmp_path)
 
 
 def test_a_missing_graph_is_told_before_anything_runs(tmp_path, park):

@@ -23,7 +23,8 @@ from scripts.debugger.recording import case_of
 from scripts.film.footage import of_log
 from scripts.report import page
 from scripts.report.study import study
-from scripts.verbs.generate import generate
+from scripts.spec import command
+from scripts.verbs.generate import Generate
 from sim.loop import LoopConfig
 from slam.errors import MobiliaError
 from slam.maps import write_map
@@ -40,6 +41,8 @@ DRIVEN = DrivePlan(
     scene="arena", slams=("odometry",), levels=(0.5,), seeds=(0,), goals=1,
     loop=LoopConfig(limit_s=2.0),
 )  # fmt: skip
+
+generate = command(Generate)
 MEASURED = ("ms_per_scan_p50", "ms_per_scan_p99", "ms_per_scan_p999", "peak_memory_mb")
 KINDS = ("flip", "cut", "remove", "add")
 ADDED = ("notes.txt", ".hidden", ".lock", ".x.1.part", "recipe.json.bak", "SHA256SUMS.old")

@@ -14,7 +14,8 @@ import typer
 from scripts import results
 from scripts.output import write_recipe
 from scripts.report.page import REPORT
-from scripts.verbs.verify import verify
+from scripts.spec import command
+from scripts.verbs.verify import Verify
 from scripts.whole_folder import whole_folder
 from sim.recording.dataset import read_plan, writing
 from sim.recording.episode import record
@@ -31,6 +32,8 @@ from tests.scripts.robustness.samples import (
 )
 
 pytestmark = pytest.mark.fuzz
+verify = command(Verify)
+
 EPISODES = ["arena-d0.5-s0000", "arena-d0.5-s0001"]
 
 
@@ -294,7 +297,7 @@ def test_a_damaged_list_does_not_let_a_changed_file_pass(tmp_path):
 def test_one_episode_is_checked_and_made_again_by_any_name(copied, monkeypatch, capsys):
     (copied / EPISODES[0]).rename(copied / "mine")
     monkeypatch.chdir(copied / "mine")
-    verify(Path(), regenerate_=1)
+    verify(Path(), regenerate=1)
     assert "same bytes mine" in capsys.readouterr().out
     Path("map.yaml").unlink()
     assert status(Path()) == 3

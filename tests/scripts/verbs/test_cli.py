@@ -2,10 +2,7 @@
 """The command line as people meet it: the whole run, and every wrong input as one clear line."""
 
 import json
-import signal
 import subprocess
-import sys
-import time
 from importlib.metadata import version
 from pathlib import Path
 
@@ -45,22 +42,13 @@ def test_the_demo_leaves_everything_it_promises(finished):
     assert all(p.stat().st_size > 0 for p in out.iterdir())
     assert "index.html first" in printed.replace("\n", " ")
     assert "ATE, unaligned" in printed
-
-
-def test_results_follow_the_schema(finished):
-    results = json.loads((finished[0] / "results.json").read_text())
-    assert results["schema"] == 1
+    results = json.loads((out / "results.json").read_text())
     keys = {"ate_unaligned_m", "ate_se2_m", "heading_rmse_rad", "ms_per_scan_p50",
             "mean_e_x", "var_e_x", "var_p_theta", "real_time_factor"}  # fmt: skip
-    for name in ("shunting", "odometry"):
-        assert keys <= set(results["slams"][name])
+    assert keys <= set(results["slams"]["shunting"]) & set(results["slams"]["odometry"])
     assert results["slams"]["shunting"]["ate_unaligned_m"] < 0.05
-
-
-def test_the_recipe_says_what_was_run(finished):
-    recipe = json.loads((finished[0] / "recipe.json").read_text())
-    assert recipe["settings"]["scene"] == "office"
-    assert recipe["settings"]["seed"] == 3
+    recipe = json.loads((out / "recipe.json").read_text())
+    assert (recipe["settings"]["scene"], recipe["settings"]["seed"]) == ("office", 3)
     assert {"mujoco", "numpy", "numba", "python"} <= set(recipe["versions"])
 
 
@@ -103,24 +91,6 @@ def test_an_unusable_mujoco_gl_is_one_line_and_no_obstacle(tmp_path: Path):
     assert 'src="trajectories.png"' in page
     assert "map.yaml" not in page  # odometry has none
     assert (out / "results.json").exists()
-
-
-def test_an_interrupted_run_leaves_nothing(tmp_path: Path):
-    """``test_generate`` has the same of Ctrl-C."""
-    process = subprocess.Popen(
-        [sys.executable, "-m", "scripts", "demo", "--seconds", "600", "--no-film",
-         "--out", str(tmp_path / "made" / "out")],
-        stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, cwd=REPO,
-    )  # fmt: skip
-    deadline = time.monotonic() + 120.0
-    while not list(tmp_path.iterdir()) and time.monotonic() < deadline:
-        time.sleep(0.1)
-    time.sleep(0.5)
-    process.send_signal(signal.SIGTERM)
-    _, errors = process.communicate(timeout=60)
-    assert process.returncode == 130
-    assert "interrupted" in errors
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_log_of_one_scan_is_a_run(tmp_path: Path, called):

@@ -10,12 +10,14 @@ import pytest
 import sim
 from scripts.options import named
 from scripts.output import read_recipe_words, write_recipe
-from scripts.verbs.config import config
+from scripts.spec import command
+from scripts.verbs.config import Config
 from sim.actors.config import ACTORS
 from sim.sensors.lidar import registry
 from slam import config_of
 from slam.set_numbers import with_set
-from tests.processes import python
+
+config = command(Config)
 
 pytestmark = pytest.mark.slow
 
@@ -81,13 +83,6 @@ def test_the_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
     lines = capsys.readouterr().out.splitlines()
     assert max(map(len, lines)) <= 110
     assert any("key_m" in line and "between key frames" in line for line in lines)
-
-
-def test_the_numbers_of_a_slam_need_no_simulator() -> None:
-    code = "import slam, sys; slam.config_of('shunting')[0].sha256(); print(sorted(sys.modules))"
-    done = python("-c", code)
-    assert "'slam.shunting.slam'" in done.stdout
-    assert "'mujoco'" not in done.stdout
 
 
 def test_commas_inside_braces_part_no_names() -> None:

@@ -18,7 +18,7 @@ def test_nothing_is_cut_and_nothing_is_marked_up(monkeypatch, terminal: bool):
     file = io.StringIO()
     console = Console(file=file, width=80, force_terminal=terminal, color_system=None)
     monkeypatch.setattr(listing, "console", console)
-    listing.listing()
+    listing.Listing()()
     printed = file.getvalue()
     assert "`" not in printed
     assert "…" not in printed

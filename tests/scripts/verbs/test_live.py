@@ -8,7 +8,7 @@ import pytest
 
 from scripts.live import view
 from scripts.live.session import Opener
-from scripts.verbs.live import _serve
+from scripts.verbs.live import Live
 from slam.errors import InvalidValueError
 
 pytestmark = pytest.mark.slow
@@ -39,7 +39,7 @@ def test_an_address_that_others_reach_is_warned_of(host, warned, monkeypatch, ca
 
     monkeypatch.setattr(view, "View", Once)
     with pytest.raises(InvalidValueError, match="enough"):
-        _serve(Opener(slams=["odometry"]), (host, 8765), [], playing=True, speed=1.0)
+        Live(host=host).serve(Opener(slams=["odometry"]), [])
     printed = " ".join(capsys.readouterr().out.split())
     assert f"http://{host}:8765/" in printed
     assert ("There is no encryption" in printed) is warned

@@ -69,12 +69,6 @@ def test_another_clock_is_named_and_can_be_aligned(called, ours, tmp_path):
     assert called("score", late, "--on", ours, *words).returncode == 0
 
 
-def test_a_bag_without_statements_lists_its_topics(called, ours, tmp_path):
-    ended = called("score", ours, "--pose", "/amcl_pose", "--out", tmp_path / "out")
-    assert ended.returncode == 1
-    assert "no pose on /amcl_pose" in ended.stdout + ended.stderr
-
-
 def test_poses_that_cannot_be_are_left_out_and_told_once(ours, tmp_path, caplog):
     say, spread = IncrementMessage(MAP), np.diag([0.01, 0.02, 0.03])
     with Writer(tmp_path / "b", version=VERSION, storage_plugin=StoragePlugin.MCAP) as bag:
@@ -99,6 +93,7 @@ def test_without_truth_what_can_be_said_is_said(called, tmp_path):
 @pytest.mark.parametrize(
     ("spoil", "says"),
     [
+        (lambda said: ("--pose", "/amcl_pose"), "no pose on /amcl_pose"),
         (lambda said: ("--map-frame", "world"), "no world -> odom on /tf; topics: /tf"),
         (lambda said: ("--clock-offset", "nan"), "--clock-offset must be a number from"),
         (lambda said: torn(said), "said: corrupt or truncated bag"),

@@ -14,13 +14,15 @@ from scripts.card import rows as sensor_rows
 from scripts.card.beside import simulated
 from scripts.card.page import page, table
 from scripts.card.rows import Row
-from scripts.verbs.sensor_card import sensor_card
+from scripts.spec import command
+from scripts.verbs.sensor_card import SensorCard
 from sim.sensors.lidar.registry import scanner_of
 from sim.sensors.lidar.sheet import NOT_STATED, sheet_of
 from slam.errors import MobiliaError
 from slam.evaluation.scanner.card import ScannerCard, measure
 
 pytestmark = pytest.mark.slow
+sensor_card = command(SensorCard)
 
 
 @pytest.mark.parametrize(

@@ -7,7 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.verbs.generate import generate
+from scripts.spec import command
+from scripts.verbs.generate import Generate
 from sim.recording.dataset import Plan, check_dataset, read_plan
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.tables import CHANGES, COLUMNS, FILES, REARRANGED, THINGS
@@ -16,6 +17,8 @@ from slam.errors import InvalidValueError
 from slam.logs.bag_topics import Bag
 
 pytestmark = pytest.mark.slow
+generate = command(Generate)
+
 REPO = Path(__file__).resolve().parents[3]
 N, CHANGE = 3, 0.4
 NAMES = [f"office-d0.3-c0.4-s0002-session{k:02d}" for k in range(N)]

@@ -17,9 +17,10 @@ import yaml
 from mcap.reader import make_reader
 from mcap_ros2.decoder import DecoderFactory
 
+from scripts import spec
 from scripts.metrics.judged import in_first_frame
 from scripts.single_run.run import Log, on_log
-from scripts.verbs.generate import generate
+from scripts.verbs.generate import Generate
 from sim.moments import toured
 from sim.recording.bag import FORMAT, BagWriter
 from sim.recording.recipe import RECIPE
@@ -37,6 +38,8 @@ from slam.ros.template import EPOCH_NS
 from slam.trajectory import Trajectory, read_tum, write_tum
 
 pytestmark = pytest.mark.slow
+generate = spec.command(Generate)
+
 REPO = Path(__file__).resolve().parents[3]
 
 
