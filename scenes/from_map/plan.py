@@ -17,8 +17,8 @@ from scenes.plan_file import check_span
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Pose = tuple[float, float, float]
 
 OCCUPIED, FREE = 0.65, 0.25

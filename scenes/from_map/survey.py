@@ -14,8 +14,8 @@ from scenes.from_map.walls import footprint
 from scenes.plan_file import check_span
 from slam import se2
 from slam.errors import InvalidValueError
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Pose = tuple[float, float, float]
 

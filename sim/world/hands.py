@@ -9,18 +9,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from scenes.assembly import hulls, moved
 from scenes.kinds import kind_of
-from sim.actors.chairs import IMPULSE_MAX, Shoves
+from sim.actors.chairs import Shoves
+from sim.actors.config import CHAIRS
 from sim.actors.doors import SWINGS
 from sim.core.flow import box_clearance
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.world import World
 from slam.errors import InvalidValueError, UnknownNameError
 
-Float = NDArray[np.float64]
 PUSH_TICKS = 15  # 0.2 s, between the shortest and the longest of ``sim.actors.chairs``
 MOST_SPEED = 3.0  # m/s, of a push
 MOST_HOLD_S = 600.0  # that a door is held open or shut
@@ -46,7 +45,7 @@ def push(world: World, name: str, speed: float, heading: float) -> float:
     shoves = _shoves_of(world, name)
     row = shoves.names.index(name)
     mass, _, friction, _ = shoves.table.bodies[row].tolist()
-    speed = min(speed, IMPULSE_MAX / mass)
+    speed = min(speed, CHAIRS.impulse_max / mass)
     dof = int(shoves.table.dofs[row])
     tick = SUBSTEPS_PER_TICK / SUBSTEPS_PER_S
     duration = PUSH_TICKS * tick

@@ -15,10 +15,9 @@ from scenes.assembly import hulls, moved
 from scenes.kinds import kind_of
 from sim.core.seeds import Seeds
 from sim.world.world import World
-from slam.frames import NS_PER_S
+from slam.frames import NS_PER_S, Float
 from slam.shaped import MOST, shaped
 
-Float = NDArray[np.float64]
 FAR_M = 3.0  # m from where it is taken to where it is put, at least
 FREE_M = 0.35  # m between its hull and that of anything that moves, where it is put
 LEAST_S = 1.0  # s from one time to the next, at least
