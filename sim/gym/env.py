@@ -283,6 +283,16 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         x, y, _ = self.simulation.world.robot_pose().tolist()
         return x, y
 
+    def told(self) -> dict[str, Any]:
+        """What of the info is cheap: truth of the robot, its goal and what it ran into."""
+        return {
+            "pose": self.simulation.world.robot_pose(),
+            "goal": self.goal,
+            "goal_distance": self.goal_distance,
+            "hard_collision": any(contact.hard for contact in self.contacts),
+            "is_success": self.is_success,
+        }
+
     @property
     def goal(self) -> Goal | None:
         """(x, y) m in the world, if this episode has a goal."""
@@ -299,34 +309,18 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._task is not None and self._task.distance < GOAL_RADIUS_M
 
     def _observation(self, scan: ScanResult) -> Observation:
-        """What the robot knows by the scan that was just taken."""
-        simulation = self.simulation
-        spec = simulation.spec
-        ranges, valid = observed(scan.ranges, spec.range_min, spec.range_max)
-        observation = {
-            "ranges": ranges,
-            "valid": valid,
-            "encoders": simulation.encoders.ticks,
-            "time": np.array(simulation.world.time_ns * 1e-9),
-        }
-        if self._pose_source is not None:
-            polar = self._goal is not None
-            observation |= self._pose_source.observation(self.goal, polar=polar)
-        return observation
+        polar = self._goal is not None
+        return observed(self.simulation, scan, self._pose_source, self.goal, polar=polar)
 
     def _info(self) -> dict[str, Any]:
         world, frame = self.simulation.world, self.simulation.frame
         assert frame is not None  # a scan was just taken
         return {
-            "pose": world.robot_pose(),
+            **self.told(),
             "frame": frame,
             "beam_time": frame.stamp + self.simulation.spec.beam_time_offsets,
             "contacts": tuple(contact.name for contact in self.contacts),
-            "hard_collision": any(contact.hard for contact in self.contacts),
             "movers": dict(zip(world.mover_names, world.mover_poses(), strict=True)),
-            "goal": self.goal,
-            "goal_distance": self.goal_distance,
-            "is_success": self.is_success,
         }
 
     def render(self) -> NDArray[np.uint8] | None:
