@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from copy import deepcopy
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -33,6 +33,15 @@ MOST_SCANS = 1000  # of one step
 
 class ResetNeededError(MobiliaError, gymnasium.error.ResetNeeded):
     """The environment must be reset first."""
+
+
+class Outcome(NamedTuple):
+    """Of a step, without its info."""
+
+    observation: Observation
+    reward: float
+    terminated: bool
+    truncated: bool
 
 
 class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -236,10 +245,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """``frame_skip`` scans under the given command, fewer where the episode ends."""
-        observation, reward, terminated, truncated = self.act(*clipped(action))
-        return observation, reward, terminated, truncated, self._info()
+        outcome = self.act(*clipped(action))
+        return *outcome, self._info()
 
-    def act(self, v: float, omega: float) -> tuple[Observation, float, bool, bool]:
+    def act(self, v: float, omega: float) -> Outcome:
         """``step`` of a command in [-1, 1], without the info."""
         world, task = self.simulation.world, self._task
         start_ns = world.time_ns
@@ -265,7 +274,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if task is not None:
             seconds = (world.time_ns - start_ns) * 1e-9
             reward = task.reward(*self._place(), hard=hard, seconds=seconds)
-        return self._observation(scan), reward, terminated, truncated
+        return Outcome(self._observation(scan), reward, terminated, truncated)
 
     def _look(self) -> ScanResult:
         """The scan of the time that has passed, of which the source of the pose hears too."""
