@@ -13,7 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.actors.config import DRIVE
-from sim.actors.robot import steered, toward
+from sim.actors.robot import DriveConfig, steered, toward
 from sim.driving.navgrid import NavGrid
 from slam._jit import inner, njit
 from slam.errors import InvalidValueError
@@ -33,6 +33,17 @@ class TourConfig(Settings):
     goal_radius_m: float = number(0.5, "m", "from a goal that counts as visited", low=1e-6)
     patience_s: float = number(6.0, "s", "without progress: the next goal is tried", low=1e-6)
     turn_radius_m: float = number(0.0, "m", "of a car's tightest turn; 0: it turns on the spot")
+
+
+def tour_at(drive: DriveConfig, robot_radius_m: float) -> TourConfig:
+    """A tour as fast as the drive can, but not above the usual, with that clearance in m."""
+    usual = TourConfig()
+    return TourConfig(
+        v_max_mps=min(usual.v_max_mps, drive.v_max),
+        omega_max_radps=min(usual.omega_max_radps, drive.omega_max),
+        robot_radius_m=robot_radius_m,
+        turn_radius_m=drive.turn_radius,
+    )
 
 
 @inner

@@ -6,14 +6,13 @@ loop steers ``sim.driving.drive.Driver`` with an estimate instead.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.kinds import kind_of
 from sim.actors.config import DRIVE
-from sim.driving.drive import Driver, TourConfig, tour
+from sim.driving.drive import Driver, TourConfig, tour, tour_at
 from sim.driving.navgrid import NavGrid
 from sim.world.robots import Robot
 from sim.world.world import World
@@ -33,16 +32,9 @@ def tour_of(robot: Robot | None) -> TourConfig:
 
     Its clearance is that of the disc about its axle that holds its footprint.
     """
-    usual = TourConfig()
     if robot is None:
-        return usual
-    return replace(
-        usual,
-        v_max_mps=min(usual.v_max_mps, robot.drive.v_max),
-        omega_max_radps=min(usual.omega_max_radps, robot.drive.omega_max),
-        robot_radius_m=round(robot.radius + abs(robot.ahead_m) + SPARE_M, 9),
-        turn_radius_m=robot.drive.turn_radius,
-    )
+        return TourConfig()
+    return tour_at(robot.drive, round(robot.radius + abs(robot.ahead_m) + SPARE_M, 9))
 
 
 class Pilot:
