@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from slam.errors import InvalidValueError, UnknownNameError
-from slam.shaped import NotNegative, Positive, Share, check
+from slam.shaped import NotNegative, Positive, check
 
 Group = Literal["chair", "bin", "load", "person", "door", "robot"]
 PUSHED = ("chair", "bin", "load")  # groups that a plan or a file may put
@@ -39,7 +39,7 @@ class KindOfMover:
     height_m  of its marker in the bag
     feet      None: it slides in the plane at every level
     part      path of its MJCF file; "" for ``parts/<kind>.xml``
-    usual     share of the chairs that a scene puts anywhere which are such
+    usual     weight of this kind among the chairs that a scene puts anywhere
     half_length_m  0: round, one hull. Else its hulls stand in a row along its x axis, and this is
                    half the distance between the centres of the outer two
     """
@@ -48,7 +48,7 @@ class KindOfMover:
     height_m: Positive
     feet: Feet | None = None
     part: str = ""
-    usual: Share = 0.0
+    usual: NotNegative = 0.0
     half_length_m: NotNegative = 0.0
 
     def __post_init__(self) -> None:

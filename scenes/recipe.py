@@ -121,7 +121,7 @@ def _usual_chair(luck: float) -> Kind:
     """A kind of chair for a number in [0, 1)."""
     kinds = [kind for kind, row in KINDS.items() if row.usual > 0.0]
     shares = np.cumsum([KINDS[kind].usual for kind in kinds])
-    return kinds[int(np.searchsorted(shares, luck, side="right"))]
+    return kinds[int(np.searchsorted(shares, luck * shares[-1], side="right"))]
 
 
 def park(builder: Builder, floor: Floor, kind: Kind, n: int, rng: np.random.Generator) -> None:
