@@ -18,8 +18,8 @@ from scenes.kinds import kind_of
 from scenes.placement import gap_to_boxes
 from scenes.scene import Mover, Pose, Scene
 from slam._jit import njit
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Rect = tuple[float, float, float, float]
 
 MARGIN_M = 0.03  # m between hulls, and between a hull and a box

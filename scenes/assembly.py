@@ -8,7 +8,7 @@ all whose names differ in the number only ("chair0", "chair1", ...).
 """
 
 import math
-from collections.abc import Callable, Iterable, Mapping
+from collections.abc import Callable, Iterable, Mapping, Sequence
 from functools import cache
 from pathlib import Path
 
@@ -122,6 +122,12 @@ def hulls(name: str) -> tuple[tuple[float, float, float], ...]:
     return (*((x, 0.0, radius) for x in row), *corners(name))
 
 
+def discs_of(kind: str, pose: Sequence[float]) -> list[tuple[float, float, float]]:
+    """(x, y, radius) m of the hulls of a planar thing at a pose."""
+    x, y, yaw = pose
+    return [(*moved((x, y, yaw), (u, v, 0.0))[:2], radius) for u, v, radius in hulls(kind)]
+
+
 def reach_of(name: str) -> float:
     """Radius of the disc around a planar part that holds all its hulls, m."""
     return max(math.hypot(x, y) + radius for x, y, radius in hulls(name))
@@ -176,8 +182,7 @@ class Assembly:
         person = kind_of(kind).group == "person"
 
         def prepare(child: mujoco.MjSpec) -> None:
-            for geom in child.geoms if paint else ():
-                geom.material = paint.get(geom.material, geom.material)
+            repaint(child, paint)
             if person:
                 _stand(child, pose)
 
@@ -205,6 +210,12 @@ class Assembly:
                 raise InvalidValueError(
                     f"camera '{name}': there are two of that name; 'follow' is the robot's"
                 ) from None
+
+
+def repaint(child: mujoco.MjSpec, paint: Mapping[str, str]) -> None:
+    """Give the geoms of a copy of a part other materials; ``paint``: by those in the file."""
+    for geom in child.geoms if paint else ():
+        geom.material = paint.get(geom.material, geom.material)
 
 
 def _stand(child: mujoco.MjSpec, pose: Pose) -> None:

@@ -2,12 +2,13 @@
 """What moves, added to a copy of a plan: chairs, people, bins, door leaves, the robot."""
 
 from collections.abc import Mapping
+from functools import partial
 
 import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.assembly import Assembly, moved, part
+from scenes.assembly import Assembly, moved, part, repaint
 from scenes.plan import Plan
 from scenes.scene import Kind, Mover, Pose
 from slam.errors import InvalidValueError
@@ -48,12 +49,8 @@ class Builder:
             joint.axis = [0.0, 0.0, turn]
 
         self._parts.put("door", name, hinge, prepare)
-        panel = part("door").geom("panel")
-        mover = Mover(name=name, kind="door", radius=float(panel.pos[0] + panel.size[0]))
-        self.movers.append(mover)
-        self.initial[name] = hinge
         self.door_angles[name], self._turns[name] = angle, turn
-        return mover
+        return self._hung("door", name, hinge)
 
     def add_sliding_door(self, kind: Kind, name: str, edge: Pose, *, left: bool) -> Mover:
         """Hang a sliding door, closed; ``edge`` is the end of its opening, in the wall's middle.
@@ -63,17 +60,15 @@ class Builder:
         """
         track = moved(edge, (0.0, TRACK if left else -TRACK, 0.0))
         paint = {"metal_white": "metal"} if kind == "door_lift" else {}
+        self._parts.put(kind, name, track, partial(repaint, paint=paint))
+        self.door_angles[name], self._turns[name] = 0.0, 0.0
+        return self._hung(kind, name, track)
 
-        def prepare(child: mujoco.MjSpec) -> None:
-            for geom in child.geoms:
-                geom.material = paint.get(geom.material, geom.material)
-
-        self._parts.put(kind, name, track, prepare)
+    def _hung(self, kind: Kind, name: str, pose: Pose) -> Mover:
         panel = part(kind).geom("panel")
         mover = Mover(name=name, kind=kind, radius=float(panel.pos[0] + panel.size[0]))
         self.movers.append(mover)
-        self.initial[name] = track
-        self.door_angles[name], self._turns[name] = 0.0, 0.0
+        self.initial[name] = pose
         return mover
 
     def doorway(self, name: str) -> Pose:
@@ -85,12 +80,11 @@ class Builder:
         x, y, yaw = self.initial[name]
         half = 0.5 * self._width(name)
         if self._turns[name] == 0.0:  # it slides aside
-            centre = moved((x, y, yaw), (-half, 0.0, 0.0))
-            return [centre[0], centre[1], half, LEAF_HALF, yaw]
-        centre = moved(
-            (x, y, yaw + max(self.door_angles[name], WIDE) * self._turns[name]), (half, 0.0, 0.0)
-        )
-        return [centre[0], centre[1], half, LEAF_HALF, centre[2]]
+            cx, cy, _ = moved((x, y, yaw), (-half, 0.0, 0.0))
+            return [cx, cy, half, LEAF_HALF, yaw]
+        yaw += max(self.door_angles[name], WIDE) * self._turns[name]
+        cx, cy, turned = moved((x, y, yaw), (half, 0.0, 0.0))
+        return [cx, cy, half, LEAF_HALF, turned]
 
     def leaf_boxes(self) -> NDArray[np.float64]:
         """(n, 5) all leaves, open."""

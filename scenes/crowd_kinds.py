@@ -13,7 +13,7 @@ from dataclasses import fields, replace
 import numpy as np
 
 from scenes import look
-from scenes.assembly import Assembly, hull_radius, hulls, moved
+from scenes.assembly import Assembly, discs_of, hull_radius, moved
 from scenes.crowd import GROUP, Crowd
 from scenes.kinds import kind_of
 from scenes.placement import Floor
@@ -107,11 +107,6 @@ class Filling:
 def reach_of(kind: str) -> float:
     """m from the middle of a thing to the end of its hulls, along its x axis."""
     return kind_of(kind).half_length_m + hull_radius(kind)
-
-
-def discs_of(kind: str, pose: Pose) -> list[tuple[float, float, float]]:
-    """(x, y, radius) m of the hulls of a thing at a pose."""
-    return [(*moved(pose, (x, y, 0.0))[:2], radius) for x, y, radius in hulls(kind)]
 
 
 def _halls(scene: Scene) -> list[tuple[float, float, float, float]]:

@@ -8,9 +8,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import InvalidValueError
+from slam.frames import Float
 from slam.system import Raster
 
-Float = NDArray[np.float64]
 GEOM = mujoco.mjtGeom
 HULL_GROUP = 3
 RESOLUTION_M = 0.02

@@ -39,6 +39,7 @@ class KindOfMover:
     height_m  of its marker in the bag
     feet      None: it slides in the plane at every level
     part      path of its MJCF file; "" for ``parts/<kind>.xml``
+    usual     weight of this kind among the chairs that a scene puts anywhere
     half_length_m  0: round, one hull. Else its hulls stand in a row along its x axis, and this is
                    half the distance between the centres of the outer two
     """
@@ -47,6 +48,7 @@ class KindOfMover:
     height_m: Positive
     feet: Feet | None = None
     part: str = ""
+    usual: NotNegative = 0.0
     half_length_m: NotNegative = 0.0
 
     def __post_init__(self) -> None:
@@ -55,33 +57,25 @@ class KindOfMover:
 
 KINDS = {
     "chair_swivel": KindOfMover(
-        group="chair", height_m=0.95,
+        group="chair", height_m=0.95, usual=0.75,
         feet=Feet(number=5, circle_m=0.30, first_rad=0.0, radius_m=0.028),
     ),
     "chair_visitor": KindOfMover(
-        group="chair", height_m=0.85,
+        group="chair", height_m=0.85, usual=0.25,
         feet=Feet(number=4, circle_m=0.295, first_rad=0.75, radius_m=0.012),
     ),
     "bin": KindOfMover(group="bin", height_m=0.4),
     "trolley": KindOfMover(group="load", height_m=1.0),
     "pallet": KindOfMover(group="load", height_m=0.15),
     "carton": KindOfMover(group="load", height_m=0.6),
-    "board": KindOfMover(
-        group="load", height_m=1.8, half_length_m=0.55
-    ),
-    "hospital_bed": KindOfMover(
-        group="load", height_m=1.0, half_length_m=0.55
-    ),
+    "board": KindOfMover(group="load", height_m=1.8, half_length_m=0.55),
+    "hospital_bed": KindOfMover(group="load", height_m=1.0, half_length_m=0.55),
     "couch": KindOfMover(group="load", height_m=0.8, half_length_m=0.37),
     "person": KindOfMover(group="person", height_m=1.75),
     "person_coat": KindOfMover(group="person", height_m=1.75),
     "door": KindOfMover(group="door", height_m=2.0),
-    "door_sliding": KindOfMover(
-        group="door", height_m=2.0, part="door_sliding"
-    ),
-    "door_lift": KindOfMover(
-        group="door", height_m=2.0, part="door_sliding"
-    ),
+    "door_sliding": KindOfMover(group="door", height_m=2.0, part="door_sliding"),
+    "door_lift": KindOfMover(group="door", height_m=2.0, part="door_sliding"),
     "robot": KindOfMover(group="robot", height_m=0.45),
 }  # fmt: skip
 

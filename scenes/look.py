@@ -6,7 +6,6 @@ an (n, n, 3) float image in [0, 1] that tiles seamlessly. No recorded value depe
 """
 
 import itertools
-import math
 from collections.abc import Mapping, Sequence
 from functools import cache
 from typing import Any
@@ -16,6 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from scenes.assembly import quaternion
 from scenes.marks import yaw_of
 
 Image = NDArray[np.float32]
@@ -212,7 +212,8 @@ SKIN = {
     "c": (0.70, 0.49, 0.36),
     "d": (0.48, 0.32, 0.23),
 }
-UPHOLSTERY = ("fabric_blue", "fabric_blue", "fabric_blue", "fabric_teal", "fabric_slate")
+CLOTH = "fabric_blue"  # of a part that can be upholstered
+UPHOLSTERY = (CLOTH, CLOTH, CLOTH, "fabric_teal", "fabric_slate")
 
 
 WARDROBES: Mapping[str, Mapping[str, tuple[float, float, float]]] = {
@@ -229,8 +230,8 @@ def dress(rng: np.random.Generator) -> Mapping[str, str]:
 
 
 def upholster(rng: np.random.Generator) -> Mapping[str, str]:
-    """Fabric of one swivel chair."""
-    return {"fabric_blue": str(rng.choice(UPHOLSTERY))}
+    """Fabric of one chair."""
+    return {CLOTH: str(rng.choice(UPHOLSTERY))}
 
 
 def paint_floors(spec: mujoco.MjSpec, more: Sequence[str] = ()) -> None:
@@ -257,8 +258,7 @@ def trim_walls(spec: mujoco.MjSpec) -> None:
         if kind not in WALLS or wall.group != 0:
             continue
         (x, y, z), (a, b, c) = wall.pos, wall.size
-        quat = [math.cos(0.5 * yaw_of(wall)), 0.0, 0.0, math.sin(0.5 * yaw_of(wall))]
-        top = z + c
+        quat, top = quaternion(yaw_of(wall)), z + c
         if kind == "glass":
             rail = [max(half, 0.03) for half in (a, b)]
             for which, height in (("rail", 0.03), ("cap", top)):

@@ -5,11 +5,10 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import njit
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Rect = tuple[float, float, float, float]
 
 MAX_BATCHES = 200

@@ -15,7 +15,7 @@ import numpy as np
 from msgspec import Meta
 
 from scenes import look
-from scenes.assembly import reach_of
+from scenes.assembly import part, reach_of
 from scenes.builder import Builder
 from scenes.kinds import KINDS, kind_of
 from scenes.marks import Mark
@@ -106,15 +106,22 @@ def seat_chairs(
     n = more + sum(m.group == "chair" for m in builder.movers)
     order = draws.chairs.permutation(len(seats))[:more]
     for index in sorted(order.tolist()):
-        kind: Kind = "chair_visitor" if seats[index].words[1] == "chair_visitor" else "chair_swivel"
+        said = seats[index].words[1]
+        kind = said if said in KINDS else "chair_swivel"
         pose = _askew(floor, seats[index].pose, reach_of(kind) + MARGIN, draws.chairs, PULLED)
         if pose is not None:
             _add_chair(builder, floor, kind, pose, draws)
     while sum(m.group == "chair" for m in builder.movers) < n:
-        extra: Kind = "chair_swivel" if draws.chairs.random() < 0.75 else "chair_visitor"
-        _add_chair(
-            builder, floor, extra, _anywhere(floor, extra, "n_chairs", n, draws.chairs), draws
-        )
+        kind = _usual_chair(float(draws.chairs.random()))
+        pose = _anywhere(floor, kind, "n_chairs", n, draws.chairs)
+        _add_chair(builder, floor, kind, pose, draws)
+
+
+def _usual_chair(luck: float) -> Kind:
+    """A kind of chair for a number in [0, 1)."""
+    kinds = [kind for kind, row in KINDS.items() if row.usual > 0.0]
+    shares = np.cumsum([KINDS[kind].usual for kind in kinds])
+    return kinds[int(np.searchsorted(shares, luck * shares[-1], side="right"))]
 
 
 def park(builder: Builder, floor: Floor, kind: Kind, n: int, rng: np.random.Generator) -> None:
@@ -161,8 +168,8 @@ def planned(
     if hidden:
         plan.hide_walls()
     plan.furnish_marks(parts)
-    for part, pose in put:
-        plan.furnish(part, pose)
+    for piece, pose in put:
+        plan.furnish(piece, pose)
     plan.frame_doors()
     for wall in glazed:
         plan.glaze(wall)
@@ -238,7 +245,8 @@ def _places(plan: Plan) -> tuple[tuple[str, Pose], ...]:
 
 def _add_chair(builder: Builder, floor: Floor, kind: Kind, pose: Pose, draws: Draws) -> None:
     index = sum(m.group == "chair" for m in builder.movers)
-    paint = look.upholster(draws.colours) if kind == "chair_swivel" else None
+    cloth = any(geom.material == look.CLOTH for geom in part(kind).geoms)
+    paint = look.upholster(draws.colours) if cloth else None
     builder.add(kind, f"chair{index}", pose, paint=paint)
     floor.block(pose[0], pose[1], reach_of(kind))
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from slam._jit import njit
 from slam.errors import InvalidValueError
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Rect = tuple[float, float, float, float]
 Point = tuple[float, float]

@@ -17,8 +17,8 @@ from scenes.plan_file import check_span
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Pose = tuple[float, float, float]
 
 OCCUPIED, FREE = 0.65, 0.25
@@ -202,8 +202,7 @@ def _check(map_: Raster, occupied: NDArray[np.bool_], free: NDArray[np.bool_], s
     if not occupied.any() or not free.any():
         what = "occupied" if free.any() else "free"
         raise InvalidValueError(f"{source}: has no {what} cells (are its thresholds right?)")
-    edges = sum(int((a != b).sum()) for a, b in ((occupied[1:], occupied[:-1]),
-                                                 (occupied[:, 1:], occupied[:, :-1])))  # fmt: skip
+    edges = sum(int(np.diff(occupied, axis=axis).sum()) for axis in (0, 1))
     if edges * cell_m > MAX_EDGE_M:
         raise InvalidValueError(
             f"{source}: {edges * cell_m:.0f} m of edges of what is occupied, expected at most "

@@ -14,8 +14,8 @@ from scenes.from_map.walls import footprint
 from scenes.plan_file import check_span
 from slam import se2
 from slam.errors import InvalidValueError
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 Pose = tuple[float, float, float]
 
@@ -89,7 +89,7 @@ def survey(  # noqa: PLR0913 (what is known of a building)
             f"{source}: the robot can reach {area:.1f} m2 of floor only, expected at least "
             f"{floors.LEAST_M2:g} m2 (is it a map of rooms, or noise?)"
         )
-    labels[~_around(reach, ground, cells.cell_m)] = 0
+    labels[~(ground & (_away(reach) * cells.cell_m <= floors.ROOM_M))] = 0  # not beside its ways
     gaps = [
         gap
         for gap in floors.passages_of(labels, clear, cells.cell_m)
@@ -160,11 +160,10 @@ class Cells:
 
     def beside(self, path: Float, metres: float) -> NDArray[np.bool_]:
         """Cells within that distance of a way, (n, 2) m in the map."""
-        away = np.ones(self.shape, dtype=np.uint8)
+        way = np.zeros(self.shape, dtype=np.uint8)
         points = np.ascontiguousarray(self._cells(path)[:, ::-1], dtype=np.int32)
-        cv2.polylines(away, [points.reshape(-1, 1, 2)], False, 0)
-        far = cv2.distanceTransform(away, cv2.DIST_L2, cv2.DIST_MASK_PRECISE) * self.cell_m
-        return np.asarray(far <= metres)
+        cv2.polylines(way, [points.reshape(-1, 1, 2)], False, 1)
+        return np.asarray(_away(way > 0) * self.cell_m <= metres)
 
     def reached(
         self, begin: NDArray[np.bool_], ground: NDArray[np.bool_], metres: float
@@ -225,18 +224,12 @@ def _outside(walls: Mask, cells: Cells) -> Mask:
     return np.asarray(out[n:-n, n:-n])
 
 
-def _around(
-    reach: NDArray[np.bool_], ground: NDArray[np.bool_], cell_m: float
-) -> NDArray[np.bool_]:
-    """Floor at or beside where the robot can get to."""
-    away = cv2.distanceTransform((~reach).astype(np.uint8), cv2.DIST_L2, cv2.DIST_MASK_PRECISE)
-    return np.asarray(ground & (away * cell_m <= floors.ROOM_M))
-
-
 def _rooms(
     labels: NDArray[np.int32], cell_m: float, T_map_cells: Float, source: str
 ) -> dict[str, tuple[Rect, ...]]:
     """Rectangles along the axes of the map, of floor that is all of one room."""
+    from scipy.ndimage import find_objects
+
     height, width = labels.shape
     low, high = _corners((0, 0, width, height), cell_m, T_map_cells)
     at_x, at_y = (np.flatnonzero(labels.any(axis=axis)) for axis in (0, 1))
@@ -259,27 +252,18 @@ def _rooms(
     coarse = np.where(same, middles, 0.0).astype(np.int32)
     found: dict[str, tuple[Rect, ...]] = {}
     n_rects = 0
-    for cells in _by_label(coarse):
+    for label, window in enumerate(find_objects(coarse), 1):
         if n_rects >= floors.MAX_RECTS:
             break
-        i, j = np.divmod(cells, columns)
-        i0, j0 = int(i.min()), int(j.min())
-        own = np.zeros((int(i.max()) + 1 - i0, int(j.max()) + 1 - j0), dtype=bool)
-        own[i - i0, j - j0] = True
+        own = coarse[window] == label if window else np.zeros((0, 0), dtype=bool)
         rects = floors.rectangles(own, round(floors.RECT_M / step), floors.ROOM_RECTS, 0.9)
         if not rects:
             continue
         n_rects += len(rects)
+        i0, j0 = (along.start for along in window)
         x0, y0 = low[0] + (begin[0] + j0) * step, low[1] + (begin[1] + i0) * step
-        found[f"room{len(found)}"] = tuple(
-            (
-                float(x0 + c0 * step),
-                float(y0 + r0 * step),
-                float(x0 + c1 * step),
-                float(y0 + r1 * step),
-            )
-            for r0, c0, r1, c1 in rects
-        )
+        corners = np.array(rects)[:, [1, 0, 3, 2]] * step + [x0, y0, x0, y0]
+        found[f"room{len(found)}"] = tuple(map(tuple, corners.tolist()))
     return found
 
 
@@ -288,12 +272,3 @@ def _corners(box: tuple[int, ...], cell_m: float, T_map_cells: Float) -> tuple[F
     corners = np.array([[box[i], box[j]] for i in (0, 2) for j in (1, 3)]) * cell_m
     points = se2.transform(T_map_cells, corners)
     return points.min(axis=0), points.max(axis=0)
-
-
-def _by_label(labels: NDArray[np.int32]) -> list[NDArray[np.int64]]:
-    """The cells of each label above 0, in their order, as places in the flat array."""
-    cells = np.flatnonzero(labels)
-    kinds = labels.ravel()[cells]
-    order = np.argsort(kinds, kind="stable")
-    ends = np.flatnonzero(np.diff(kinds[order])) + 1
-    return np.split(cells[order], ends) if len(cells) else []

@@ -3,83 +3,72 @@
 
 import math
 from collections.abc import Iterator
+from itertools import combinations
 
+import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import njit
-
 Cell = tuple[int, int]
 Chain = list[Cell]
-
+End = tuple[int, bool]  # number of a branch, and whether it is its last cell
 SPUR_CELLS = 5  # a side branch that is shorter is the roughness of a wall
 BEND_RAD = math.radians(40.0)  # two branches that meet straighter than this are one line
 LOOK_CELLS = 8  # along a branch, where its direction is taken
 
-# Around a cell, clockwise from the one above: row, column.
+# Around a cell, clockwise from the one above: row, column. Its sort has a bit for each that is set.
 _AROUND = ((-1, 0), (-1, 1), (0, 1), (1, 1), (1, 0), (1, -1), (0, -1), (-1, -1))
-_ROWS = np.array([d[0] for d in _AROUND])
-_COLUMNS = np.array([d[1] for d in _AROUND])
+_BITS = np.zeros((3, 3), dtype=np.float32)
+for _k, (_i, _j) in enumerate(_AROUND):
+    _BITS[1 + _i, 1 + _j] = 1 << _k
 
 
-@njit
-def _thinned(mask: NDArray[np.uint8], rows: NDArray[np.int64], columns: NDArray[np.int64]) -> None:
-    going = np.zeros(len(rows), dtype=np.bool_)
-    changed = True
-    while changed:
-        changed = False
-        for half in range(2):
-            for k in range(len(rows)):
-                i, j = rows[k], columns[k]
-                going[k] = False
-                if mask[i, j] == 0:
-                    continue
-                n, turns = 0, 0
-                before = mask[i + _ROWS[7], j + _COLUMNS[7]]
-                for d in range(8):
-                    here = mask[i + _ROWS[d], j + _COLUMNS[d]]
-                    n += here
-                    turns += before == 0 and here == 1
-                    before = here
-                north, east = mask[i - 1, j], mask[i, j + 1]
-                south, west = mask[i + 1, j], mask[i, j - 1]
-                if half == 0:
-                    open_side = north * east * south == 0 and east * south * west == 0
-                else:
-                    open_side = north * east * west == 0 and north * south * west == 0
-                going[k] = 2 <= n <= 6 and turns == 1 and open_side
-            for k in range(len(rows)):
-                if going[k]:
-                    mask[rows[k], columns[k]] = 0
-                    changed = True
+def _sorts(mask: NDArray[np.uint8]) -> NDArray[np.uint8]:
+    found = cv2.filter2D(mask, cv2.CV_32F, _BITS, borderType=cv2.BORDER_CONSTANT)
+    return np.asarray(found, dtype=np.uint8)
+
+
+def _stays(sort: int, half: int) -> bool:
+    """Whether a cell stays in one of the two halves of a round (Zhang and Suen 1984)."""
+    near = [sort >> k & 1 for k in range(8)]
+    turns = sum(not a and b for a, b in zip(near, [*near[1:], near[0]], strict=True))
+    north, east, south, west = map(bool, near[::2])
+    open_side = not (east and south and (north or west))
+    if half:
+        open_side = not (north and west and (east or south))
+    return not (2 <= sum(near) <= 6 and turns == 1 and open_side)
+
+
+_STAY = [np.array([_stays(s, half) for s in range(256)], dtype=np.uint8) for half in (0, 1)]
 
 
 def thinned(mask: NDArray[np.bool_]) -> NDArray[np.bool_]:
-    """The middle line of what is set, one cell wide (Zhang and Suen 1984)."""
-    padded = np.pad(mask.astype(np.uint8), 1)
-    rows, columns = np.nonzero(padded)
-    _thinned(padded, rows, columns)
-    return padded[1:-1, 1:-1].astype(bool)
+    """The middle line of what is set, one cell wide."""
+    line, before = mask.astype(np.uint8), -1
+    while (left := int(line.sum())) != before:
+        before = left
+        for stay in _STAY:
+            line &= cv2.LUT(_sorts(line), stay)
+    return line > 0
 
 
 def chains(skeleton: NDArray[np.bool_]) -> list[Chain]:
-    """Its lines as (row, column) cells in order; branches that go straight on are joined."""
-    near = _neighbours(skeleton)
-    branches = [c for c in _branches(near) if not _is_spur(c, near)]
-    return _joined(branches)
+    """Its lines as (row, column) cells in order; branches that go straight on are joined.
 
-
-def _neighbours(skeleton: NDArray[np.bool_]) -> dict[Cell, list[Cell]]:
-    """Next cells of each; none across a corner that a cell beside both already connects."""
-    padded = np.pad(skeleton, 1)
+    No step leads across a corner that a cell beside both already connects.
+    """
     rows, columns = np.nonzero(skeleton)
-    bits = [padded[rows + 1 + di, columns + 1 + dj].astype(int) << k
-            for k, (di, dj) in enumerate(_AROUND)]  # fmt: skip
-    sorts = np.sum(bits, axis=0).tolist()
-    return {
+    sorts = _sorts(skeleton.astype(np.uint8))[rows, columns]
+    near = {
         (i, j): [(i + di, j + dj) for di, dj in _NEXT[sort]]
-        for i, j, sort in zip(rows.tolist(), columns.tolist(), sorts, strict=True)
+        for i, j, sort in zip(rows.tolist(), columns.tolist(), sorts.tolist(), strict=True)
     }
+    return _joined([line for line in _branches(near) if not _is_spur(line, near)])
+
+
+def _is_spur(line: Chain, near: dict[Cell, list[Cell]]) -> bool:
+    degrees = sorted((len(near[line[0]]), len(near[line[-1]])))
+    return len(line) <= SPUR_CELLS and degrees[0] == 1 and degrees[1] > 2
 
 
 def _next(sort: int) -> list[Cell]:
@@ -113,24 +102,16 @@ def _branches(near: dict[Cell, list[Cell]]) -> Iterator[Chain]:
             yield line
 
 
-def _is_spur(line: Chain, near: dict[Cell, list[Cell]]) -> bool:
-    degrees = sorted((len(near[line[0]]), len(near[line[-1]])))
-    return len(line) <= SPUR_CELLS and degrees[0] == 1 and degrees[1] > 2
-
-
 def _heading(line: Chain, at_end: bool) -> float:
     """Direction out of the line at one of its ends, rad."""
-    inner, outer = (
-        (line[-min(LOOK_CELLS, len(line))], line[-1])
-        if at_end
-        else (line[min(LOOK_CELLS, len(line)) - 1], line[0])
-    )
+    ahead = line if at_end else line[::-1]
+    inner, outer = ahead[-min(LOOK_CELLS, len(line))], ahead[-1]
     return math.atan2(outer[0] - inner[0], outer[1] - inner[1])
 
 
 def _joined(branches: list[Chain]) -> list[Chain]:
     """Branches put end to end where two of those that meet at a cell go straight on."""
-    at: dict[Cell, list[tuple[int, bool]]] = {}
+    at: dict[Cell, list[End]] = {}
     for k, line in enumerate(branches):
         if line[0] != line[-1]:
             at.setdefault(line[0], []).append((k, False))
@@ -147,7 +128,7 @@ def _joined(branches: list[Chain]) -> list[Chain]:
             seen.add(j)
             first = (j, not at_end)
         whole: Chain = []
-        step: tuple[int, bool] | None = first
+        step: End | None = first
         while step is not None and step[0] not in used:
             j, from_end = step
             used.add(j)
@@ -158,22 +139,16 @@ def _joined(branches: list[Chain]) -> list[Chain]:
     return found
 
 
-def _straight_on(
-    branches: list[Chain], at: dict[Cell, list[tuple[int, bool]]]
-) -> dict[tuple[int, bool], tuple[int, bool]]:
+def _straight_on(branches: list[Chain], at: dict[Cell, list[End]]) -> dict[End, End]:
     """Which end of a branch goes on in which other: of those that meet, the straightest first."""
-    partner: dict[tuple[int, bool], tuple[int, bool]] = {}
+    partner: dict[End, End] = {}
     for ends in at.values():
         pairs = []
-        for m, one in enumerate(ends):
-            for other in ends[m + 1 :]:
-                out, back = (
-                    _heading(branches[one[0]], one[1]),
-                    _heading(branches[other[0]], other[1]),
-                )
-                bend = abs(math.remainder(out - back - math.pi, math.tau))
-                if one[0] != other[0] and (bend < BEND_RAD or len(ends) == 2):
-                    pairs.append((bend, one, other))
+        for one, other in combinations(ends, 2):
+            out, back = (_heading(branches[k], at_end) for k, at_end in (one, other))
+            bend = abs(math.remainder(out - back - math.pi, math.tau))
+            if one[0] != other[0] and (bend < BEND_RAD or len(ends) == 2):
+                pairs.append((bend, one, other))
         for _, one, other in sorted(pairs):
             if one not in partner and other not in partner:
                 partner[one], partner[other] = other, one

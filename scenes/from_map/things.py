@@ -10,10 +10,10 @@ from numpy.typing import NDArray
 
 from scenes.from_map.walls import disc
 from slam.errors import InvalidValueError
+from slam.frames import Float
 
 Mask = NDArray[np.bool_]
 
-Float = NDArray[np.float64]
 Pose = tuple[float, float, float]
 Box = tuple[float, float, float, float, float]
 

@@ -11,8 +11,8 @@ from numpy.typing import NDArray
 
 from scenes.from_map.thin import chains, thinned
 from slam.errors import InvalidValueError
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Mask = NDArray[np.bool_]
 
 SHELL_M = 0.11  # of what is solid, only so much below its surface is built: nothing sees the rest

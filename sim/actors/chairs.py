@@ -24,16 +24,14 @@ from numpy.typing import NDArray
 
 from scenes.kinds import Feet, kind_of
 from scenes.scene import Scene
-from sim.actors.config import ACTORS
+from sim.actors.config import CHAIRS
 from sim.actors.rolling import Rolling, inertia_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds, between, waiting
 from slam._jit import uncounted
+from slam.frames import Float
 
-Float = NDArray[np.float64]
-_TICKS_MIN, _TICKS_MAX = ACTORS.chairs.push_least_ticks, ACTORS.chairs.push_most_ticks
 GROUPS = ("chair", "bin", "load")
-IMPULSE_MAX = ACTORS.chairs.impulse_max
 
 
 class Shoved(NamedTuple):
@@ -70,8 +68,10 @@ def shove(time: float, tick: float, shoved: Shoved, qfrc: Float) -> None:
         schedule[i, 0] = time + waiting(counters, i, rate)
         speed = between(counters, i, low, high)
         heading = between(counters, i, -math.pi, math.pi)
-        speed = min(speed, IMPULSE_MAX / bodies[i, 0])
-        duration = tick * math.floor(between(counters, i, _TICKS_MIN, _TICKS_MAX + 1))
+        speed = min(speed, CHAIRS.impulse_max / bodies[i, 0])
+        duration = tick * math.floor(
+            between(counters, i, CHAIRS.push_least_ticks, CHAIRS.push_most_ticks + 1)
+        )
         spin = between(counters, i, -spin_max, spin_max)
         schedule[i, 1] = time + duration - 0.5 * tick
         mass, inertia, friction, yaw_friction = bodies[i]

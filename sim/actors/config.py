@@ -5,10 +5,13 @@
 kernels of the world: so they are fixed, and the same in every run.
 """
 
-from dataclasses import dataclass, field
-from typing import Any
+from collections import namedtuple
+from dataclasses import dataclass, field, fields
+from typing import Any, TypeVar, cast
 
 from slam.settings import BY_HAND, Settings, number
+
+S = TypeVar("S", bound=Settings)
 
 
 def _fixed(default: float, unit: str, meaning: str, source: str = BY_HAND) -> Any:
@@ -278,3 +281,16 @@ class ActorsConfig(Settings):
 
 
 ACTORS = ActorsConfig()
+
+
+def _constants(numbers: S) -> S:
+    """The same numbers as a named tuple, which kernels take as constants."""
+    kind = namedtuple(type(numbers).__name__, [field.name for field in fields(numbers)])  # type: ignore[misc]
+    return cast(S, kind(**numbers.as_words()))
+
+
+DOORS, WAY = _constants(ACTORS.doors), _constants(ACTORS.right_of_way)
+STEER, WALK = _constants(ACTORS.steering), _constants(ACTORS.walking)
+SIT, FOLLOW = _constants(ACTORS.sitting), _constants(ACTORS.following)
+HOLD, CLEAN = _constants(ACTORS.holding), _constants(ACTORS.cleaning)
+CHAIRS, DRIVE = _constants(ACTORS.chairs), _constants(ACTORS.driver)

@@ -19,14 +19,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.kinds import joint_of_door
-from sim.actors.config import ACTORS
+from sim.actors.config import DOORS
 from sim.actors.people.columns import PASSAGE
 from sim.core.bodies import Bodies
 from sim.core.seeds import between, waiting
 from sim.core.state import Record, Records, flat, record
 from slam._jit import inner
-
-Float = NDArray[np.float64]
+from slam.frames import Float
 
 # next event s, end of the present one s, its angle rad, until when the door is kept open for
 # someone s, and when the cabin behind it comes s (inf: uncalled)
@@ -35,17 +34,6 @@ SCHEDULE = record(np.float64, "next until angle kept comes")
 CLOSER = record(np.float64, "stiffness damping friction inertia rest rate sort")
 SWINGS, SLIDES, LIFT = 0.0, 1.0, 2.0  # sorts of door
 # the numbers, as the kernels see them
-_D = ACTORS.doors
-OPENED, PASSABLE, REST_STEP = _D.opened_rad, _D.passable_rad, _D.rest_step
-RATE_MAX, RATE_GAIN = _D.rate_max, _D.rate_gain
-TORQUE_MAX, TORQUE_GAIN = _D.torque_max, _D.torque_gain
-NEAR, FACING, CLEAR = _D.near_m, _D.facing, _D.clear_m
-SLIDE_MAX, SLIDE_OPENED, SLIDE_HELD_S = _D.slide_max, _D.slide_opened, _D.slide_held_s
-LIFT_S, LIFT_HELD_S = _D.lift_s, _D.lift_held_s
-SHUT_M, STOPPED_M, STILL_MPS, SLIDE_STARTS_S = (
-    _D.slide_shut_m, _D.slide_stopped_m, _D.slide_still_mps, _D.slide_starts_s,
-)  # fmt: skip
-HELD_S, EVENT_LEAST_S, EVENT_MOST_S = _D.held_s, _D.event_least_s, _D.event_most_s
 
 
 @inner
@@ -54,17 +42,17 @@ def robot_asks(robot: Float, middle: Float) -> bool:
     dx, dy = middle[0] - robot[0], middle[1] - robot[1]
     distance = math.sqrt(dx * dx + dy * dy)
     ahead = dx * math.cos(robot[2]) + dy * math.sin(robot[2])
-    return distance < CLEAR or (distance < NEAR and ahead > FACING * distance)
+    return distance < DOORS.clear_m or (distance < DOORS.near_m and ahead > DOORS.facing * distance)
 
 
 @inner
 def torque_to(target: float, q: float, qd: float, closer: Record) -> float:
     """N m that turns the leaf to ``target`` at a hand's pace; N for one that slides."""
-    rate = min(max(RATE_GAIN * (target - q), -closer.rate), closer.rate)
+    rate = min(max(DOORS.rate_gain * (target - q), -closer.rate), closer.rate)
     friction = math.copysign(closer.friction, rate) if abs(rate) > 0.02 else 0.0
     push = closer.stiffness * (q - closer.rest) + closer.damping * rate + friction
-    torque = push + TORQUE_GAIN * closer.inertia * (rate - qd)
-    return float(min(max(torque, -TORQUE_MAX), TORQUE_MAX) + 0.0)
+    torque = push + DOORS.torque_gain * closer.inertia * (rate - qd)
+    return float(min(max(torque, -DOORS.torque_max), DOORS.torque_max) + 0.0)
 
 
 class Leaves(NamedTuple):
@@ -94,14 +82,14 @@ def kept_open(time: float, lift: bool, asked: bool, inside: bool, q: float, row:
     """
     if not lift:
         if asked or inside:
-            row.kept = time + SLIDE_HELD_S
+            row.kept = time + DOORS.slide_held_s
         return bool(time < row.kept)
     if time >= row.comes:
-        row.kept, row.comes = time + LIFT_HELD_S, math.inf
-    elif asked and time >= row.kept and q < SHUT_M and row.comes == math.inf:
-        row.comes = time + LIFT_S
-    elif (asked or inside) and q >= SHUT_M:
-        row.kept = max(row.kept, time + SLIDE_HELD_S)
+        row.kept, row.comes = time + DOORS.lift_held_s, math.inf
+    elif asked and time >= row.kept and q < DOORS.slide_shut_m and row.comes == math.inf:
+        row.comes = time + DOORS.lift_s
+    elif (asked or inside) and q >= DOORS.slide_shut_m:
+        row.kept = max(row.kept, time + DOORS.slide_held_s)
     return bool(time < row.kept)
 
 
@@ -113,9 +101,13 @@ def slide_on(time: float, lift: bool, q: float, qd: float, row: Record) -> tuple
     """
     if time < row.until and not lift:
         return row.angle, True
-    if time > max(row.kept, row.until) + SLIDE_STARTS_S and q > STOPPED_M and abs(qd) < STILL_MPS:
-        row.kept = time + SLIDE_HELD_S
-    return -SHUT_M, q > SHUT_M
+    if (
+        time > max(row.kept, row.until) + DOORS.slide_starts_s
+        and q > DOORS.slide_stopped_m
+        and abs(qd) < DOORS.slide_still_mps
+    ):
+        row.kept = time + DOORS.slide_held_s
+    return -DOORS.slide_shut_m, q > DOORS.slide_shut_m
 
 
 @inner
@@ -136,11 +128,11 @@ def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float
         if time >= row.next:  # always three draws
             row.next = time + waiting(draws, d, rates[d])
             row.angle = between(draws, d, low, high)
-            row.until = time + between(draws, d, EVENT_LEAST_S, EVENT_MOST_S)
+            row.until = time + between(draws, d, DOORS.event_least_s, DOORS.event_most_s)
         if closer.sort != SWINGS:
             asked = passage[d].asked > 0.0 or robot_asks(robot, middles[d])
             lift, inside = closer.sort == LIFT, passage[d].inside > 0.0
-            target, driven = SLIDE_OPENED * high, True
+            target, driven = DOORS.slide_opened * high, True
             if not kept_open(time, lift, asked, inside, qpos[at], row):
                 target, driven = slide_on(time, lift, qpos[at], qvel[dof], row)
             qfrc[dof] = torque_to(target, qpos[at], qvel[dof], closer) if driven else 0.0
@@ -150,10 +142,11 @@ def swing(time: float, robot: Float, leaves: Leaves, physics: tuple[Float, Float
             or robot_asks(robot, middles[d])
             or (passage[d].inside > 0.0 and time < row.kept)
         ):
-            row.kept = time + HELD_S
+            row.kept = time + DOORS.held_s
         if time < row.kept:
-            disturbed = time < row.until or closer.rest < PASSABLE or qpos[at] < PASSABLE
-            target = min(max(OPENED, closer.rest), high)
+            shut = min(closer.rest, qpos[at]) < DOORS.passable_rad
+            disturbed = time < row.until or shut
+            target = min(max(DOORS.opened_rad, closer.rest), high)
         elif time < row.until:
             # an angle is not forced upon someone who stands in the doorway
             disturbed, target = True, qpos[at] if passage[d].inside > 0.0 else row.angle
@@ -195,9 +188,9 @@ class Doors:
         kinds = {mover.name: mover.kind for mover in bodies.scene.movers}
         for d, name in enumerate(self.names):
             joint = model.joint(f"{name}/{joint_of_door(kinds[name])}")
-            pace = RATE_MAX, SWINGS
+            pace = DOORS.rate_max, SWINGS
             if kinds[name] != "door":
-                pace = SLIDE_MAX, LIFT if kinds[name] == "door_lift" else SLIDES
+                pace = DOORS.slide_max, LIFT if kinds[name] == "door_lift" else SLIDES
             closer, self._limits[d] = _closer(model, joint)
             self._closers[d] = *closer, *pace
             self.schedule["next"][d] = waiting(self._draws, d, rate)
@@ -224,7 +217,7 @@ class Doors:
                     closed,
                 )
                 continue
-            rest = REST_STEP * round(float(self._closers["rest"][d]) / REST_STEP)
+            rest = DOORS.rest_step * round(float(self._closers["rest"][d]) / DOORS.rest_step)
             yaw, half = closed + sign * rest, 0.5 * float(self.widths[d])
             boxes[d] = x + half * math.cos(yaw), y + half * math.sin(yaw), half, 0.03, yaw
         return boxes

@@ -14,16 +14,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.scene import Scene
-from sim.actors.config import ACTORS
+from sim.actors.config import HOLD
 from sim.core.bodies import Bodies
 from sim.core.state import Records, record
 from slam._jit import inner
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-_H = ACTORS.holding
-STIFFNESS, DAMPING = _H.stiffness, _H.damping
-FORCE_MAX, TORQUE_MAX, LOST = _H.force_max, _H.torque_max, _H.lost_m
 # First qpos and dof of the holder, then of what is held, -1: an empty hand; first dof of what has
 # just been put down, or -1.
 HANDS = record(np.int64, "qa va qb vb dropped")
@@ -70,22 +67,22 @@ def hold(held: Held | None, qpos: Float, qvel: Float, qfrc: Float) -> None:
             rx = ry = 0.0
             bx, by = -math.cos(qpos[qb + 2]) * arm, -math.sin(qpos[qb + 2]) * arm
         ex, ey = qpos[qa] + rx - qpos[qb] - bx, qpos[qa + 1] + ry - qpos[qb + 1] - by
-        if ex * ex + ey * ey > LOST * LOST:
+        if ex * ex + ey * ey > HOLD.lost_m * HOLD.lost_m:
             continue
         wa, wb = qvel[va + 2], qvel[vb + 2]
         du = qvel[va] - wa * ry - qvel[vb] + wb * by
         dv = qvel[va + 1] + wa * rx - qvel[vb + 1] - wb * bx
         mass, inertia = held.bodies[k]
-        fx = mass * (STIFFNESS * ex + DAMPING * du)
-        fy = mass * (STIFFNESS * ey + DAMPING * dv)
+        fx = mass * (HOLD.stiffness * ex + HOLD.damping * du)
+        fy = mass * (HOLD.stiffness * ey + HOLD.damping * dv)
         size = math.sqrt(fx * fx + fy * fy)
-        over = max(size / FORCE_MAX, 1.0)
+        over = max(size / HOLD.force_max, 1.0)
         fx, fy, torque = fx / over, fy / over, 0.0
         if not held.hinged[k]:
             turn = qpos[qa + 2] + held.pose[k, 2] - qpos[qb + 2]
             turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
-            torque = inertia * (STIFFNESS * turn + DAMPING * (wa - wb))
-            torque = min(max(torque, -TORQUE_MAX), TORQUE_MAX)
+            torque = inertia * (HOLD.stiffness * turn + HOLD.damping * (wa - wb))
+            torque = min(max(torque, -HOLD.torque_max), HOLD.torque_max)
         qfrc[vb] += fx
         qfrc[vb + 1] += fy
         qfrc[vb + 2] += torque + bx * fy - by * fx

@@ -26,9 +26,8 @@ from sim.core.seeds import uniform
 from sim.core.sight import Eye, View, hidden, opaque_boxes
 from sim.sensors.lidar.surfaces import glass_geoms
 from slam._jit import njit
-from slam.frames import LaserSpec
+from slam.frames import Float, LaserSpec
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 PERIOD_S = 2.0  # s between two moments
 FAR_M, APART_M = 1000.0, 3.0  # from the floor to what is out, beyond any beam; between two of these

@@ -16,20 +16,15 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.actors.config import ACTORS
+from sim.actors.config import CHAIRS
 from sim.core.seeds import between, uniform
 from sim.core.state import Records, flat, record
 from slam._jit import inner
+from slam.frames import Float
 from slam.shaped import within
-
-Float = NDArray[np.float64]
 
 # number of the turn, heading rad, speed m/s, spin rad/s, for how long held up s
 STATE = record(np.float64, "turn heading speed spin stuck")
-_C = ACTORS.chairs
-TURN_S, BRAKE_S, PATIENCE_S = _C.turn_s, _C.brake_s, _C.patience_s
-SPEEDS, SPIN_MAX = (_C.slowest_mps, _C.fastest_mps), _C.spin_max
-TAU_S, ACCEL_MAX = _C.tau_s, _C.accel_max
 GOLDEN = 2.399963229728653  # rad
 
 
@@ -59,27 +54,27 @@ def roll(time: float, tick: float, rolled: Rolled, qvel: Float, qfrc: Float) -> 
     n = len(dofs)
     if share == 0:
         return
-    cycle = TURN_S * n / share
+    cycle = CHAIRS.turn_s * n / share
     for i in range(n):
         dof, row = dofs[i], state[i]
-        since = time - TURN_S * ranks[i] / share
+        since = time - CHAIRS.turn_s * ranks[i] / share
         turn = math.floor(since / cycle)
         phase = since - turn * cycle
         if turn != row.turn:
             row.turn = turn
             row.heading = between(counters, i, -math.pi, math.pi)
-            row.speed = between(counters, i, SPEEDS[0], SPEEDS[1])
-            row.spin = between(counters, i, -SPIN_MAX, SPIN_MAX)
+            row.speed = between(counters, i, CHAIRS.slowest_mps, CHAIRS.fastest_mps)
+            row.spin = between(counters, i, -CHAIRS.spin_max, CHAIRS.spin_max)
             row.stuck = 0.0
-        if phase >= TURN_S:
+        if phase >= CHAIRS.turn_s:
             for k in range(3):
                 qfrc[dof + k] = 0.0
             continue
         speed = math.sqrt(qvel[dof] * qvel[dof] + qvel[dof + 1] * qvel[dof + 1])
         row.stuck = row.stuck + tick if speed < 0.3 * row.speed else 0.0
-        if row.stuck > PATIENCE_S:
+        if row.stuck > CHAIRS.patience_s:
             row.heading, row.stuck = row.heading + GOLDEN, 0.0
-        go = row.speed if phase < TURN_S - BRAKE_S else 0.0
+        go = row.speed if phase < CHAIRS.turn_s - CHAIRS.brake_s else 0.0
         wanted = (
             go * math.cos(row.heading),
             go * math.sin(row.heading),
@@ -88,9 +83,11 @@ def roll(time: float, tick: float, rolled: Rolled, qvel: Float, qfrc: Float) -> 
         for k in range(3):
             mass = bodies[i, 0] if k < 2 else bodies[i, 1]
             friction = bodies[i, 2] if k < 2 else bodies[i, 3]
-            accel = (wanted[k] - qvel[dof + k]) / TAU_S
+            accel = (wanted[k] - qvel[dof + k]) / CHAIRS.tau_s
             help_it = math.copysign(friction, wanted[k]) if wanted[k] != 0.0 else 0.0
-            qfrc[dof + k] = mass * min(max(accel, -ACCEL_MAX), ACCEL_MAX) + help_it + 0.0
+            qfrc[dof + k] = (
+                mass * min(max(accel, -CHAIRS.accel_max), CHAIRS.accel_max) + help_it + 0.0
+            )
 
 
 class Rolling:

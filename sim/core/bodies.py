@@ -15,12 +15,12 @@ from sim.core.flow import box_clearance
 from sim.core.state import Records
 from slam._jit import njit
 from slam.errors import InvalidValueError
+from slam.frames import Float
 from slam.shaped import Pose, shaped
 
 if TYPE_CHECKING:
     from scenes.scene import Mover, Scene
 
-Float = NDArray[np.float64]
 STATIC = -1  # mover index of everything that cannot move
 
 _STATE = int(mujoco.mjtState.mjSTATE_INTEGRATION)

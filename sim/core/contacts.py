@@ -13,8 +13,7 @@ from scenes.kinds import KINDS
 from sim.core.bodies import Bodies
 from sim.core.engine import Engine, call_force
 from slam._jit import inner
-
-Float = NDArray[np.float64]
+from slam.frames import Float
 
 _MOST = 1024  # contacts that are looked at; chairs on castors have five each
 HARD_FORCE = 60.0  # N; a robot of 22 kg that brakes on something at more than a third of g

@@ -13,11 +13,10 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit, uncounted
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 FAR = 1e6  # s/(m/s), travel time of a node with no way to the goal
 WALL = 0.06  # m, nodes nearer than this to a box are solid; twice this is more than a cell
 

@@ -16,9 +16,8 @@ from numpy.typing import NDArray
 from scenes.footprint import HULL_GROUP, at_rest, static_geoms
 from slam import se2
 from slam._jit import njit
-from slam.frames import LaserSpec
+from slam.frames import Float, LaserSpec
 
-Float = NDArray[np.float64]
 RAYS = 2880  # of a whole turn: an eighth of a degree apart
 NEAR_M = 1.2  # m from the laser to a hull: what is nearer counts as in view
 SKIRT_M = 0.1  # m around a hull that must be hidden too

@@ -12,8 +12,8 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.actors.config import ACTORS
-from sim.actors.robot import steered
+from sim.actors.config import DRIVE
+from sim.actors.robot import DriveConfig, steered, toward
 from sim.driving.navgrid import NavGrid
 from slam._jit import inner, njit
 from slam.errors import InvalidValueError
@@ -21,12 +21,6 @@ from slam.frames import Float
 from slam.settings import Settings, number
 
 _FAR = 1e6
-_D = ACTORS.driver
-_STEP_S, LOOK_AHEAD_M, _ACCEL, _ALPHA = _D.step_s, _D.look_ahead_m, _D.accel, _D.alpha
-_OVERLAP_M, _RUN_OVER, _AHEAD, _FREE, _FREE_M = (
-    _D.overlap_m, _D.run_over, _D.ahead, _D.free, _D.free_m,
-)  # fmt: skip
-_TURNING, _REVERSE, _STANDING = _D.turning, _D.reverse, _D.standing
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -39,6 +33,17 @@ class TourConfig(Settings):
     goal_radius_m: float = number(0.5, "m", "from a goal that counts as visited", low=1e-6)
     patience_s: float = number(6.0, "s", "without progress: the next goal is tried", low=1e-6)
     turn_radius_m: float = number(0.0, "m", "of a car's tightest turn; 0: it turns on the spot")
+
+
+def tour_at(drive: DriveConfig, robot_radius_m: float) -> TourConfig:
+    """A tour as fast as the drive can, but not above the usual, with that clearance in m."""
+    usual = TourConfig()
+    return TourConfig(
+        v_max_mps=min(usual.v_max_mps, drive.v_max),
+        omega_max_radps=min(usual.omega_max_radps, drive.omega_max),
+        robot_radius_m=robot_radius_m,
+        turn_radius_m=drive.turn_radius,
+    )
 
 
 @inner
@@ -98,19 +103,19 @@ def _score(  # noqa: PLR0913 (kernel)
     start = min(_between(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, 0.0)) - radius
     closest = _FAR
     for step in range(1, 15):
-        t = _STEP_S * step
-        v += min(max(v_asked - v, -_ACCEL * _STEP_S), _ACCEL * _STEP_S)
-        omega += min(max(omega_asked - omega, -_ALPHA * _STEP_S), _ALPHA * _STEP_S)
+        t = DRIVE.step_s * step
+        v = toward(v, v_asked, DRIVE.accel * DRIVE.step_s)
+        omega = toward(omega, omega_asked, DRIVE.alpha * DRIVE.step_s)
         omega = steered(v, omega, turn_radius)
-        x += _STEP_S * v * math.cos(theta + 0.5 * _STEP_S * omega)
-        y += _STEP_S * v * math.sin(theta + 0.5 * _STEP_S * omega)
-        theta += _STEP_S * omega
+        x += DRIVE.step_s * v * math.cos(theta + 0.5 * DRIVE.step_s * omega)
+        y += DRIVE.step_s * v * math.sin(theta + 0.5 * DRIVE.step_s * omega)
+        theta += DRIVE.step_s * omega
         free = min(_between(clearance, x0, y0, cell, x, y), _nearest_disc(discs, x, y, t)) - radius
         # an overlap at the start may be driven out of
-        if free < 0.0 and free <= start + _OVERLAP_M:
+        if free < 0.0 and free <= start + DRIVE.overlap_m:
             if v_asked != 0.0:
                 return -_FAR
-            run_over = _RUN_OVER
+            run_over = DRIVE.run_over
         closest = min(closest, free)
     here = _field_at(cost_to_go, x0, y0, cell, x, y)
     ahead = _field_at(
@@ -119,8 +124,8 @@ def _score(  # noqa: PLR0913 (kernel)
     if here >= _FAR:
         here = 50.0
     ahead = min(ahead, here + 0.5)
-    gain = -here - _AHEAD * ahead + _FREE * min(closest, _FREE_M)
-    return gain - _TURNING * abs(omega_asked) - run_over
+    gain = -here - DRIVE.ahead * ahead + DRIVE.free * min(closest, DRIVE.free_m)
+    return gain - DRIVE.turning * abs(omega_asked) - run_over
 
 
 @njit
@@ -137,14 +142,14 @@ def _choose(
     for a in range(-1, 7):
         v = v_max * a / 6.0
         if a < 0:
-            v = -_REVERSE * v_max
+            v = -DRIVE.reverse * v_max
         for b in range(-6, 7):
             omega = omega_max * b / 6.0
             if a < 0 and abs(b) > 3:
                 continue
             score = _score(pose, now, v, omega, turn_radius, discs, grid)
             if a <= 0:
-                score -= _STANDING
+                score -= DRIVE.standing
             if score > best:
                 best_v, best_omega, best = v, omega, score
     return best_v, best_omega, best
@@ -162,7 +167,7 @@ class Driver:
         self.config = config
         self.goals = np.asarray(goals, dtype=np.float64)
         self.visited = 0
-        self.look_ahead_m = LOOK_AHEAD_M  # a robot that is to stop on its goal looks less far
+        self.look_ahead_m = DRIVE.look_ahead_m  # a robot that is to stop on its goal looks less far
         self._grid = self._walls = grid
         self._index = 0
         self._best = math.inf

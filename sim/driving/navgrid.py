@@ -61,9 +61,12 @@ class NavGrid:
 
     def cost_near(self, costs: Float, x: float, y: float) -> float:
         """The least of ``costs`` within a cell of (x, y): a robot may stand where none may go."""
-        j, i = math.floor((x - self.x0) / self.cell), math.floor((y - self.y0) / self.cell)
-        around = costs[max(0, i - 1) : i + 2, max(0, j - 1) : j + 2]
-        return float(around.min()) if around.size else _FAR
+        return float(costs[self.around(x, y)].min(initial=_FAR))
+
+    def around(self, x: float, y: float) -> tuple[slice, slice]:
+        """Rows and columns of the cells within one of (x, y); none far outside."""
+        i, j = math.floor((y - self.y0) / self.cell), math.floor((x - self.x0) / self.cell)
+        return slice(max(0, i - 1), max(0, i + 2)), slice(max(0, j - 1), max(0, j + 2))
 
     def cost_to(self, goal: Float) -> Float:
         """Cost of the best way to ``goal`` from every cell: metres, dearer close to walls.

@@ -6,14 +6,13 @@ loop steers ``sim.driving.drive.Driver`` with an estimate instead.
 """
 
 import math
-from dataclasses import replace
 
 import numpy as np
 from numpy.typing import NDArray
 
 from scenes.kinds import kind_of
-from sim.actors.config import ACTORS
-from sim.driving.drive import Driver, TourConfig, tour
+from sim.actors.config import DRIVE
+from sim.driving.drive import Driver, TourConfig, tour, tour_at
 from sim.driving.navgrid import NavGrid
 from sim.world.robots import Robot
 from sim.world.world import World
@@ -21,9 +20,6 @@ from slam import se2
 from slam._jit import njit
 from slam.frames import NS_PER_S, Float
 
-_D = ACTORS.driver
-SIGHT_M, AJAR, REPLAN_S, DECIDE_S = _D.sight_m, _D.ajar_rad, _D.replan_s, _D.decide_s
-LEAF_DISCS, LEAF_M = _D.leaf_discs, _D.leaf_m
 BODY, DOOR, ROBOT = 0, 1, 2
 PARTS = 3  # discs of what is long: its middle and its two ends
 SPARE_M = 0.005  # of the clearance beyond the footprint
@@ -36,16 +32,9 @@ def tour_of(robot: Robot | None) -> TourConfig:
 
     Its clearance is that of the disc about its axle that holds its footprint.
     """
-    usual = TourConfig()
     if robot is None:
-        return usual
-    return replace(
-        usual,
-        v_max_mps=min(usual.v_max_mps, robot.drive.v_max),
-        omega_max_radps=min(usual.omega_max_radps, robot.drive.omega_max),
-        robot_radius_m=round(robot.radius + abs(robot.ahead_m) + SPARE_M, 9),
-        turn_radius_m=robot.drive.turn_radius,
-    )
+        return TourConfig()
+    return tour_at(robot.drive, round(robot.radius + abs(robot.ahead_m) + SPARE_M, 9))
 
 
 class Pilot:
@@ -85,7 +74,7 @@ class Pilot:
     def command(self, dt: float) -> tuple[float, float]:
         """(v m/s, omega rad/s) for the next ``dt`` s, from where everything truly is now."""
         self._since += dt
-        if self._last is not None and self._since < DECIDE_S:
+        if self._last is not None and self._since < DRIVE.decide_s:
             return self._decided
         dt, self._since = self._since, 0.0
         poses = self.world.mover_poses()
@@ -94,10 +83,10 @@ class Pilot:
         here = self.world.robot_pose()
         velocity = self._velocity(here, dt)
         before = poses if before is None else before
-        discs = self._discs(poses, before, here, SIGHT_M, dt)
+        discs = self._discs(poses, before, here, DRIVE.sight_m, dt)
         if len(self._ghosts):
             gap = self._ghosts[:, :2] - here[:2]
-            near = gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1] < SIGHT_M * SIGHT_M
+            near = gap[:, 0] * gap[:, 0] + gap[:, 1] * gap[:, 1] < DRIVE.sight_m * DRIVE.sight_m
             discs = np.concatenate([discs, self._ghosts[near]])
         self._decided = self.driver.command(here, velocity, discs, dt)
         return self._decided
@@ -108,7 +97,7 @@ class Pilot:
 
     def _replan(self, poses: Float) -> None:
         """Plan again when a leaf stands elsewhere by more than about 20 degrees."""
-        if self.world.time_ns - self._planned_ns < REPLAN_S * NS_PER_S:
+        if self.world.time_ns - self._planned_ns < DRIVE.replan_s * NS_PER_S:
             return
         self._planned_ns = self.world.time_ns
         leaves = self._open_leaves(poses)
@@ -124,10 +113,10 @@ class Pilot:
         rows = []
         doors = np.column_stack([poses, self._radii])[self._doors]
         for (x, y, yaw, width), closed in zip(doors.tolist(), self._closed.tolist(), strict=True):
-            if abs(se2.wrap(yaw - closed)) > AJAR:
+            if abs(se2.wrap(yaw - closed)) > DRIVE.ajar_rad:
                 half = 0.5 * width
                 cx, cy = x + half * math.cos(yaw), y + half * math.sin(yaw)
-                rows.append((cx, cy, half, LEAF_M, yaw))
+                rows.append((cx, cy, half, DRIVE.leaf_m, yaw))
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
     def _velocity(self, here: Float, dt: float) -> tuple[float, float]:
@@ -156,21 +145,21 @@ def _surroundings(  # noqa: PLR0913 (kernel)
     Six along each leaf, three along what is long.
     """
     radii, halves = sizes
-    discs = np.empty((len(poses) * LEAF_DISCS, 5))
+    discs = np.empty((len(poses) * DRIVE.leaf_discs, 5))
     count = 0
     for k in range(len(poses)):
         if kinds[k] == ROBOT:
             continue
         parts = PARTS if halves[k] > 0.0 else 1
         if kinds[k] == DOOR:
-            parts = LEAF_DISCS
+            parts = DRIVE.leaf_discs
         for part in range(parts):
             x, y, radius, vx, vy = poses[k, 0], poses[k, 1], radii[k], 0.0, 0.0
             if kinds[k] == DOOR:
-                reach = radii[k] * (part + 1) / LEAF_DISCS
+                reach = radii[k] * (part + 1) / DRIVE.leaf_discs
                 x += reach * math.cos(poses[k, 2])
                 y += reach * math.sin(poses[k, 2])
-                radius = LEAF_M
+                radius = DRIVE.leaf_m
             else:
                 bx, by = before[k, 0], before[k, 1]
                 if parts == PARTS:

@@ -4,7 +4,7 @@
 from collections.abc import Sequence
 from concurrent.futures import Executor
 from copy import deepcopy
-from typing import Any
+from typing import Any, NamedTuple
 
 import gymnasium
 import numpy as np
@@ -33,6 +33,15 @@ MOST_SCANS = 1000  # of one step
 
 class ResetNeededError(MobiliaError, gymnasium.error.ResetNeeded):
     """The environment must be reset first."""
+
+
+class Outcome(NamedTuple):
+    """Of a step, without its info."""
+
+    observation: Observation
+    reward: float
+    terminated: bool
+    truncated: bool
 
 
 class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
@@ -236,10 +245,10 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         self, action: NDArray[np.float32]
     ) -> tuple[Observation, float, bool, bool, dict[str, Any]]:
         """``frame_skip`` scans under the given command, fewer where the episode ends."""
-        observation, reward, terminated, truncated = self.act(*clipped(action))
-        return observation, reward, terminated, truncated, self._info()
+        outcome = self.act(*clipped(action))
+        return *outcome, self._info()
 
-    def act(self, v: float, omega: float) -> tuple[Observation, float, bool, bool]:
+    def act(self, v: float, omega: float) -> Outcome:
         """``step`` of a command in [-1, 1], without the info."""
         world, task = self.simulation.world, self._task
         start_ns = world.time_ns
@@ -265,7 +274,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         if task is not None:
             seconds = (world.time_ns - start_ns) * 1e-9
             reward = task.reward(*self._place(), hard=hard, seconds=seconds)
-        return self._observation(scan), reward, terminated, truncated
+        return Outcome(self._observation(scan), reward, terminated, truncated)
 
     def _look(self) -> ScanResult:
         """The scan of the time that has passed, of which the source of the pose hears too."""
@@ -283,6 +292,16 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         x, y, _ = self.simulation.world.robot_pose().tolist()
         return x, y
 
+    def told(self) -> dict[str, Any]:
+        """What of the info is cheap: truth of the robot, its goal and what it ran into."""
+        return {
+            "pose": self.simulation.world.robot_pose(),
+            "goal": self.goal,
+            "goal_distance": self.goal_distance,
+            "hard_collision": any(contact.hard for contact in self.contacts),
+            "is_success": self.is_success,
+        }
+
     @property
     def goal(self) -> Goal | None:
         """(x, y) m in the world, if this episode has a goal."""
@@ -299,34 +318,18 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
         return self._task is not None and self._task.distance < GOAL_RADIUS_M
 
     def _observation(self, scan: ScanResult) -> Observation:
-        """What the robot knows by the scan that was just taken."""
-        simulation = self.simulation
-        spec = simulation.spec
-        ranges, valid = observed(scan.ranges, spec.range_min, spec.range_max)
-        observation = {
-            "ranges": ranges,
-            "valid": valid,
-            "encoders": simulation.encoders.ticks,
-            "time": np.array(simulation.world.time_ns * 1e-9),
-        }
-        if self._pose_source is not None:
-            polar = self._goal is not None
-            observation |= self._pose_source.observation(self.goal, polar=polar)
-        return observation
+        polar = self._goal is not None
+        return observed(self.simulation, scan, self._pose_source, self.goal, polar=polar)
 
     def _info(self) -> dict[str, Any]:
         world, frame = self.simulation.world, self.simulation.frame
         assert frame is not None  # a scan was just taken
         return {
-            "pose": world.robot_pose(),
+            **self.told(),
             "frame": frame,
             "beam_time": frame.stamp + self.simulation.spec.beam_time_offsets,
             "contacts": tuple(contact.name for contact in self.contacts),
-            "hard_collision": any(contact.hard for contact in self.contacts),
             "movers": dict(zip(world.mover_names, world.mover_poses(), strict=True)),
-            "goal": self.goal,
-            "goal_distance": self.goal_distance,
-            "is_success": self.is_success,
         }
 
     def render(self) -> NDArray[np.uint8] | None:

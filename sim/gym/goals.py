@@ -44,14 +44,14 @@ class Ground:
         self._world = world
         self._radius = float(world.scene.movers[-1].radius)
         self._start = world.robot_pose()
-        self._layout = NavGrid(world.scene.bounds, world.scene.obstacles, self._radius)
+        self.layout = NavGrid(world.scene.bounds, world.scene.obstacles, self._radius)
 
     def checked(self, goal: Goal) -> Goal:
         """``goal``, where the robot can get to on the static layout, shut doors left aside.
 
         Raises ``InvalidValueError`` with the nearest free place for one elsewhere.
         """
-        grid = self._layout
+        grid = self.layout
         ways = grid.cost_to(self._start[:2])
         if grid.cost_near(ways, *goal) < _BLOCKED:
             return goal
@@ -73,10 +73,10 @@ class Ground:
         robot cannot go anywhere.
         """
         discs = hull_discs(self._world)
-        points = _centres(self._layout)
+        points = _centres(self.layout)
         away = np.hypot(points[..., 0] - self._start[0], points[..., 1] - self._start[1])
         for things in (self._things(), np.zeros((0, 5))):
-            grid = self._layout.with_boxes(things)
+            grid = self.layout.with_boxes(things)
             ways = grid.cost_to(self._start[:2])
             free = (ways < _BLOCKED) & (grid.clearance >= self._radius + ROOM_M)
             for x, y, radius in discs.tolist() if len(things) else ():
@@ -111,32 +111,25 @@ class Ground:
             rows.append((x, y, half, half, 0.0))
         return np.array(rows, dtype=np.float64).reshape(-1, 5)
 
-    def way(self, goal: Goal) -> "Way":
-        """To measure what is left to ``goal``."""
-        return Way(self._layout, goal)
-
 
 class Way:
     """m of way to a goal on the static layout, those near walls counted up to three times."""
 
     def __init__(self, grid: NavGrid, goal: Goal) -> None:
-        self._grid = grid
+        self._grid, self._centres = grid, _centres(grid)
         self._costs = grid.cost_to(np.array(goal))
         self._left = math.inf
 
     def left(self, x: float, y: float) -> float:
         """From (x, y); where nothing can be told there, what was told last."""
-        grid = self._grid
-        i0, j0 = math.floor((y - grid.y0) / grid.cell), math.floor((x - grid.x0) / grid.cell)
-        best = math.inf
-        for i in range(max(0, i0 - 1), min(self._costs.shape[0], i0 + 2)):
-            for j in range(max(0, j0 - 1), min(self._costs.shape[1], j0 + 2)):
-                cost = float(self._costs[i, j])
-                if cost < _BLOCKED:
-                    cx, cy = grid.x0 + (j + 0.5) * grid.cell, grid.y0 + (i + 0.5) * grid.cell
-                    best = min(best, cost + math.hypot(cx - x, cy - y))
-        if math.isfinite(best):
-            self._left = best
+        near = self._grid.around(x, y)
+        costs, centres = self._costs[near].ravel(), self._centres[near].reshape(-1, 2)
+        known = costs < _BLOCKED
+        ways = [
+            cost + math.hypot(cx - x, cy - y)
+            for cost, (cx, cy) in zip(costs[known].tolist(), centres[known].tolist(), strict=True)
+        ]
+        self._left = min(ways, default=self._left)
         return self._left
 
 
@@ -173,7 +166,7 @@ class Task:
         """The robot starts at (x, y) m."""
         self.distance = self._distance(x, y)
         if self.kind == "shaped":
-            self._way = self.ground.way(self.goal)
+            self._way = Way(self.ground.layout, self.goal)
             self._left = self._way.left(x, y)
 
     def reached(self, x: float, y: float) -> bool:

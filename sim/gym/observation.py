@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What an environment tells a policy, and shows: its space, finite ranges, two pictures."""
+"""What an environment tells a policy, and shows: its observation, and two pictures."""
 
+import math
 from typing import Annotated, Any
 
 import numpy as np
@@ -8,7 +9,8 @@ from gymnasium import spaces
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from sim.gym.pose_source import PoseSource
+from sim.gym.pose_source import FAR_M, PoseSource
+from sim.sensors.lidar.device import ScanResult
 from sim.simulation import Simulation
 from slam._jit import njit
 from slam.frames import LaserSpec
@@ -20,25 +22,62 @@ Observation = dict[str, Any]  # arrays by name; Gymnasium types Dict spaces so
 
 
 def space_of(spec: LaserSpec, *, believing: bool, polar: bool = False) -> spaces.Dict:
-    """The space of an environment's observations.
+    """The space of what ``observed`` gives.
 
     ``believing``: with a ``pose_source``; ``polar``: with range and bearing of the goal.
     """
     n = spec.n_beams
-    believed = PoseSource.space(polar=polar) if believing else {}
-    return spaces.Dict(
-        {
-            "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),
-            "valid": spaces.Box(0, 1, (n,), np.uint8),
-            "encoders": spaces.Box(-_MAX_TICKS, _MAX_TICKS, (2,), np.int64),
-            "time": spaces.Box(0.0, 1e9, (), np.float64),
-            **believed,
+    entries: dict[str, spaces.Space[Any]] = {
+        "ranges": spaces.Box(0.0, np.float32(spec.range_max), (n,), np.float32),
+        "valid": spaces.Box(0, 1, (n,), np.uint8),
+        "encoders": spaces.Box(-_MAX_TICKS, _MAX_TICKS, (2,), np.int64),
+        "time": spaces.Box(0.0, 1e9, (), np.float64),
+    }
+    if believing:
+        most = np.array([FAR_M, FAR_M, np.pi])
+        entries |= {
+            "pose": spaces.Box(-most, most, (3,), np.float64),
+            "trusted": spaces.Box(0, 1, (), np.uint8),
+            "goal": spaces.Box(-3.0 * FAR_M, 3.0 * FAR_M, (2,), np.float64),
         }
-    )
+    if polar:
+        low, high = np.array([0.0, -np.pi]), np.array([5.0 * FAR_M, np.pi])
+        entries["goal_polar"] = spaces.Box(low, high, (2,), np.float64)
+    return spaces.Dict(entries)
+
+
+def observed(
+    simulation: Simulation,
+    scan: ScanResult,
+    source: PoseSource | None,
+    goal: tuple[float, float] | None,
+    *,
+    polar: bool,
+) -> Observation:
+    """What the robot knows by the scan that was just taken; ``goal`` m in the world."""
+    spec = simulation.spec
+    ranges, valid = _finite(scan.ranges, spec.range_min, spec.range_max)
+    entries: Observation = {
+        "ranges": ranges,
+        "valid": valid,
+        "encoders": simulation.encoders.ticks,
+        "time": np.array(simulation.world.time_ns * 1e-9),
+    }
+    if source is not None:
+        there = np.zeros(2) if goal is None else source.towards(goal)
+        entries |= {
+            "pose": source.pose.copy(),
+            "trusted": np.array(source.trusted, dtype=np.uint8),
+            "goal": there,
+        }
+        if polar:
+            x, y = there.tolist()
+            entries["goal_polar"] = np.array([math.hypot(x, y), math.atan2(y, x)])
+    return entries
 
 
 @njit
-def observed(
+def _finite(
     ranges: NDArray[np.float32], least: float, most: float
 ) -> tuple[NDArray[np.float32], NDArray[np.uint8]]:
     """Finite ranges, and which are measurements, as ``Scan.valid``."""

@@ -18,16 +18,17 @@ from gymnasium.vector import AutoresetMode, VectorEnv
 from gymnasium.vector.utils import batch_space
 from numpy.typing import NDArray
 
-from sim.gym.block import Block, Board
+from sim.gym.block import Block, board_of, row_of
 from sim.gym.env import MobiliaEnv, ResetNeededError
 from sim.gym.observation import Observation
 from sim.gym.options import array_of, checked_seed, of_rooms
 from sim.gym.workers import RoomsEndedError, Workers
 from slam.errors import InvalidValueError
-from slam.shaped import shaped, whole
+from slam.shaped import one_of, shaped, whole
 
 MOST_ENVS = 4096  # each holds a physics model of its own
 MOST_WORKERS = 1024
+MODES = tuple(mode.name.lower() for mode in AutoresetMode)
 
 
 class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
@@ -100,9 +101,10 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             self._rooms = Workers(workers, space, num_envs, self.mode, settings, frames=frames)
             weakref.finalize(self, self._rooms.close)  # where nobody closes it
         else:
-            board = Board(space, num_envs)
+            board = board_of(row_of(space), num_envs)
             self._rooms = Block(dict(enumerate(rooms)), board, self.mode, frames=frames)
         self._board = self._rooms.board
+        self._now, self._last = self._board["now"], self._board["last"]
 
     def each(
         self, work: Callable[[MobiliaEnv], Any], rooms: Sequence[int] | None = None
@@ -140,7 +142,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         chosen = {i: seeds[i] for i in np.flatnonzero(mask).tolist()}
         self._show(self._rooms.reset(chosen, own))
         self._begun |= mask
-        return _copied(self._board.seen), self._infos()
+        return _copied(self._now["seen"]), self._infos()
 
     def _refuse_closed(self) -> None:
         if self.closed:
@@ -174,23 +176,24 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         self._refuse_closed()
         if not self._begun.all():
             raise ResetNeededError("call reset() before using the environment")
-        if self.mode == AutoresetMode.DISABLED and board.ends.any():
-            raise ResetNeededError(f"reset first: {np.flatnonzero(board.ends.any(axis=0))}")
-        board.commands[...] = commands
+        if self.mode == AutoresetMode.DISABLED and board["ends"].any():
+            raise ResetNeededError(f"reset first: {np.flatnonzero(board['ends'].any(axis=1))}")
+        board["command"] = commands
         self._show(self._rooms.step())
-        terminated, truncated = board.ends.copy()
+        terminated, truncated = board["ends"].T.copy()
         infos = self._infos()
-        if self.mode == AutoresetMode.SAME_STEP and board.ends.any():
+        if self.mode == AutoresetMode.SAME_STEP and board["ends"].any():
             infos |= self._final(terminated | truncated)
-        return _copied(board.seen), board.rewards.copy(), terminated, truncated, infos
+        return _copied(self._now["seen"]), board["reward"].copy(), terminated, truncated, infos
 
     def _final(self, ended: NDArray[np.bool_]) -> dict[str, Any]:
         """The last observations and infos of the rooms that ended and began anew."""
-        board, seen, infos = self._board, np.full(self.num_envs, None, dtype=object), self._infos()
+        seen, infos = np.full(self.num_envs, None, dtype=object), self._infos()
         for i in np.flatnonzero(ended).tolist():
-            seen[i] = {name: np.array(rows[i]) for name, rows in board.last_seen.items()}
-            for name, rows in board.last_told.items():
-                infos[name][i] = rows[i]
+            last = self._last[i]
+            seen[i] = {name: np.array(last["seen"][name]) for name in last["seen"].dtype.names}
+            for name in last["told"].dtype.names:
+                infos[name][i] = last["told"][name]
             if self._frames:
                 infos["frame"][i] = self._shown[1, i]
         return {
@@ -198,7 +201,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         }  # fmt: skip
 
     def _infos(self) -> dict[str, Any]:
-        told = _copied(self._board.told)
+        told = _copied(self._now["told"])
         if self._frames:
             told["frame"] = self._shown[0].copy()
         return told | {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in told}
@@ -211,15 +214,11 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         self._rooms.close()
 
 
-def _copied(rows: Mapping[str, NDArray[Any]]) -> dict[str, Any]:
-    return {name: stacked.copy() for name, stacked in rows.items()}
+def _copied(rows: NDArray[Any]) -> dict[str, Any]:
+    return {name: rows[name].copy() for name in rows.dtype.names or ()}
 
 
 def _mode(value: str | AutoresetMode) -> AutoresetMode:
     if isinstance(value, AutoresetMode):
         return value
-    try:
-        return AutoresetMode[value.upper()]
-    except (KeyError, AttributeError):
-        known = ", ".join(mode.name.lower() for mode in AutoresetMode)
-        raise InvalidValueError(f"autoreset_mode must be one of {known}, got {value!r}") from None
+    return AutoresetMode[one_of("autoreset_mode", value, MODES).upper()]

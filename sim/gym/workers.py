@@ -25,7 +25,7 @@ import gymnasium
 from gymnasium import spaces
 from gymnasium.vector import AutoresetMode
 
-from sim.gym.block import Block, Board
+from sim.gym.block import Block, Board, board_of, row_of
 from sim.gym.env import MobiliaEnv
 from slam.errors import InvalidValueError, MobiliaError
 from slam.names import child_environment, load, loaded
@@ -69,14 +69,15 @@ class Workers:
     ) -> None:
         self._asked, self._ended = 0, ""
         self._workers: list[tuple[subprocess.Popen[bytes], Connection]] = []
-        size = Board.size(space, n)
+        row = row_of(space)
+        size = n * row.itemsize
         try:
             with tempfile.TemporaryFile(dir=_folder()) as file:
                 _reserve(file.fileno(), size)
-                self.board = Board(space, n, mmap.mmap(file.fileno(), size))
+                self.board: Board = board_of(row, n, mmap.mmap(file.fileno(), size))
                 for k in range(n_workers):
                     self._start(file.fileno(), k, n_workers)
-            self._all("begin", loaded(), _packed(space, n, mode, dict(settings), frames))
+            self._all("begin", loaded(), _packed(row, n, mode, dict(settings), frames))
         except BaseException:
             self.close()
             raise
@@ -228,8 +229,8 @@ def _block(
     memory: int, k: int, n_workers: int, threads: Executor, modules: Sequence[str], told: bytes
 ) -> Block:
     load(modules)  # before what is told, which may be of them
-    space, n, mode, settings, frames = _unpacked(told)
-    board = Board(space, n, mmap.mmap(memory, Board.size(space, n)))
+    row, n, mode, settings, frames = _unpacked(told)
+    board = board_of(row, n, mmap.mmap(memory, n * row.itemsize))
     mine = range(k * n // n_workers, (k + 1) * n // n_workers)
     rooms = {i: MobiliaEnv(**settings) for i in mine}
     return Block(rooms, board, mode, frames=frames, threads=threads)

@@ -13,7 +13,8 @@ from dataclasses import dataclass
 import numpy as np
 
 from scenes.scene import Scene
-from sim.driving.drive import LOOK_AHEAD_M, Driver, TourConfig
+from sim.actors.config import DRIVE
+from sim.driving.drive import Driver, TourConfig
 from sim.driving.navgrid import NavGrid
 from sim.loop.sight import Sight
 from slam import se2
@@ -246,7 +247,7 @@ class Navigator:
         room = np.sqrt(offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1])
         discs[:, 2] = np.minimum(discs[:, 2], room - self._tour.robot_radius_m)
         assert self._driver is not None  # made with the first plan
-        self._driver.look_ahead_m = min(LOOK_AHEAD_M, max(CREEP_M, distance - CREEP_M))
+        self._driver.look_ahead_m = min(DRIVE.look_ahead_m, max(CREEP_M, distance - CREEP_M))
         v, omega = self._driver.command(here, velocity, discs, dt)
         share = min(1.0, max(SLOWEST_MPS, distance) / max(abs(v), 1e-9))
         return share * v, share * omega

@@ -27,7 +27,7 @@ from sim.moments import Moment
 from sim.recording.topics import OURS, LabelsMessage, MoreTopics, ObjectsMessage
 from slam.estimate import Raster
 from slam.frames import LaserSpec
-from slam.ros.frames import BEGAN, LATCHED, FrameMessages, Message
+from slam.ros.frames import BEGAN, FrameMessages, Message
 from slam.ros.template import EPOCH_NS, STORE
 
 if sys.version_info >= (3, 14):
@@ -189,11 +189,11 @@ class BagWriter:
             "/ground_truth/labels": self._labels,
             "/map": self._has_map,
         }
-        for topic, kind in {**OURS, **self._more.kinds}.items():
-            if made.get(topic, True):
-                latched = [_LATCHED] if topic in LATCHED else []
-                self._connections[topic] = self._writer.add_connection(
-                    topic, kind, typestore=STORE, offered_qos_profiles=latched
+        for topic in (*OURS.values(), *self._more.topics):
+            if made.get(topic.name, True):
+                latched = [_LATCHED] if topic.latched else []
+                self._connections[topic.name] = self._writer.add_connection(
+                    topic.name, topic.kind, typestore=STORE, offered_qos_profiles=latched
                 )
         self._chunks = _Chunks(self._writer.storage)
         return self

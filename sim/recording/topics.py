@@ -15,6 +15,7 @@ from slam._jit import njit
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import BeamLabels, Float, LaserSpec, Scan
 from slam.ros.frames import SCANS, STATE
+from slam.ros.link import Topic
 from slam.ros.messages import LASER, WORLD
 from slam.ros.template import STORE, Marks, Template, header, message
 
@@ -160,12 +161,12 @@ class LabelsMessage:
 Maker = Callable[[Moment], Any]
 F = TypeVar("F", bound=Maker)
 _topics: dict[str, tuple[str, Maker]] = {}
-OURS = {  # by name their types, in the order of a bag's connections
-    **STATE,
-    "/ground_truth/objects": ObjectsMessage.KIND,
-    "/ground_truth/labels": LabelsMessage.KIND,
-    **SCANS,
-}
+_OWN = (
+    Topic(name="/ground_truth/objects", kind=ObjectsMessage.KIND),
+    Topic(name="/ground_truth/labels", kind=LabelsMessage.KIND),
+)
+OURS = {topic.name: topic for topic in (*STATE, *_OWN, *SCANS)}
+"""By name, in the order of a bag's connections."""
 
 
 def topic(name: str, kind: str) -> Callable[[F], F]:
@@ -202,7 +203,7 @@ class MoreTopics:
 
     def __init__(self) -> None:
         self._topics = dict(sorted(_topics.items()))
-        self.kinds = {name: kind for name, (kind, _) in self._topics.items()}
+        self.topics = [Topic(name=name, kind=kind) for name, (kind, _) in self._topics.items()]
 
     def __call__(self, moment: Moment) -> list[tuple[str, bytearray]]:
         """(topic, message) of those that have one now."""

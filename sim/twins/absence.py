@@ -25,8 +25,8 @@ from numpy.typing import NDArray
 
 from scenes.groups import with_held
 from scenes.kinds import is_door, joint_of_door
-from sim.actors.doors import OPENED
-from sim.actors.people import columns, gait
+from sim.actors.config import DOORS
+from sim.actors.people import columns
 from sim.sensors.lidar.candidates import HULL_GROUP
 from sim.sensors.lidar.device import LaserScanner
 from sim.simulation import Simulation
@@ -128,7 +128,7 @@ def _park(world: World, name: str) -> None:
     kind = world.scene.movers[row].kind
     if is_door(kind):
         joint = world.model.joint(f"{name}/{joint_of_door(kind)}")
-        qpos[addresses] = min(OPENED, float(joint.range[1]))
+        qpos[addresses] = min(DOORS.opened_rad, float(joint.range[1]))
         return
     _, ymin, xmax, _ = world.scene.bounds
     qpos[addresses] = 0.0
@@ -137,12 +137,7 @@ def _park(world: World, name: str) -> None:
     _free_seat(world, name)
     _halt(world, name, seated=False)
     if name in world.people.names:
-        i, table = world.people.names.index(name), world.people.table
-        gait.stand(qpos, table.torsos[i : i + 1], world.people.feet[i : i + 1])
-        physics, mocap = (qpos, world.data.qvel), (world.data.mocap_pos, world.data.mocap_quat)
-        gait.walk(
-            0.0, physics, table.torsos, table.limbs, world.people.feet, table.crowd.state, mocap
-        )
+        world.people.stand(world.data, name)
 
 
 def _let_go(world: World, out: Sequence[str]) -> None:

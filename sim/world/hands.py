@@ -9,18 +9,17 @@ import math
 from collections.abc import Sequence
 
 import numpy as np
-from numpy.typing import NDArray
 
-from scenes.assembly import hulls, moved
-from scenes.kinds import kind_of
-from sim.actors.chairs import IMPULSE_MAX, Shoves
+from scenes.assembly import discs_of
+from scenes.scene import Mover
+from sim.actors.chairs import Shoves
+from sim.actors.config import CHAIRS
 from sim.actors.doors import SWINGS
 from sim.core.flow import box_clearance
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.world import World
 from slam.errors import InvalidValueError, UnknownNameError
 
-Float = NDArray[np.float64]
 PUSH_TICKS = 15  # 0.2 s, between the shortest and the longest of ``sim.actors.chairs``
 MOST_SPEED = 3.0  # m/s, of a push
 MOST_HOLD_S = 600.0  # that a door is held open or shut
@@ -46,7 +45,7 @@ def push(world: World, name: str, speed: float, heading: float) -> float:
     shoves = _shoves_of(world, name)
     row = shoves.names.index(name)
     mass, _, friction, _ = shoves.table.bodies[row].tolist()
-    speed = min(speed, IMPULSE_MAX / mass)
+    speed = min(speed, CHAIRS.impulse_max / mass)
     dof = int(shoves.table.dofs[row])
     tick = SUBSTEPS_PER_TICK / SUBSTEPS_PER_S
     duration = PUSH_TICKS * tick
@@ -127,25 +126,18 @@ def in_the_way(world: World, x: float, y: float, radius: float | None = None) ->
     for mover, place in zip(world.scene.movers, world.mover_poses().tolist(), strict=True):
         if mover.group == "robot" and radius is None:
             continue
-        long = mover.group == "door" or kind_of(mover.kind).half_length_m > 0.0
-        for at, far in _discs(mover.kind, mover.group, place, mover.radius, long):
-            if math.hypot(at[0] - x, at[1] - y) < far + own:
-                return f"{mover.name} is there"
+        if any(math.hypot(u - x, v - y) < far + own for u, v, far in _discs(mover, place)):
+            return f"{mover.name} is there"
     return ""
 
 
-def _discs(
-    kind: str, group: str, place: Sequence[float], radius: float, long: bool
-) -> list[tuple[tuple[float, float], float]]:
-    """Centres and radii, m, of what a mover covers; a leaf is six discs, as for the driver."""
+def _discs(mover: Mover, place: Sequence[float]) -> list[tuple[float, float, float]]:
+    """(x, y, radius) m of what a mover covers; a leaf is six discs, as for the driver."""
     x, y, yaw = place
-    if group == "door":
-        steps = [radius * k / 6.0 for k in range(1, 7)]
-        return [((x + r * math.cos(yaw), y + r * math.sin(yaw)), 0.05) for r in steps]
-    if not long:
-        return [((x, y), radius)]
-    parts = [(moved((x, y, yaw), (hx, hy, 0.0)), r) for hx, hy, r in hulls(kind)]
-    return [((at[0], at[1]), r) for at, r in parts]
+    if mover.group == "door":
+        steps = [mover.radius * k / 6.0 for k in range(1, 7)]
+        return [(x + r * math.cos(yaw), y + r * math.sin(yaw), 0.05) for r in steps]
+    return [(x, y, mover.radius)] if mover.group == "robot" else discs_of(mover.kind, place)
 
 
 def free_goal(world: World, name: str = "") -> tuple[float, float, float]:

@@ -11,14 +11,12 @@ import numpy as np
 from msgspec import Meta
 from numpy.typing import NDArray
 
-from scenes.assembly import hulls, moved
-from scenes.kinds import kind_of
+from scenes.assembly import discs_of
 from sim.core.seeds import Seeds
 from sim.world.world import World
-from slam.frames import NS_PER_S
+from slam.frames import NS_PER_S, Float
 from slam.shaped import MOST, shaped
 
-Float = NDArray[np.float64]
 FAR_M = 3.0  # m from where it is taken to where it is put, at least
 FREE_M = 0.35  # m between its hull and that of anything that moves, where it is put
 LEAST_S = 1.0  # s from one time to the next, at least
@@ -86,11 +84,10 @@ class Kidnapping:
 
 def hull_discs(world: World, *, doors: bool = True) -> Float:
     """(k, 3) x, y, radius m of all hulls of what moves but the robot; of a door, all its swing."""
-    rows = []
+    rows: list[tuple[float, ...]] = []
     for mover, pose in zip(world.scene.movers, world.mover_poses().tolist(), strict=True):
-        if mover.group == "robot" or (mover.group == "door" and not doors):
-            continue
-        long = mover.group != "door" and kind_of(mover.kind).half_length_m > 0.0
-        for x, y, radius in hulls(mover.kind) if long else ((0.0, 0.0, mover.radius),):
-            rows.append((*moved(tuple(pose), (x, y, 0.0))[:2], radius))
+        if mover.group == "door":
+            rows += [(*pose[:2], mover.radius)] if doors else []
+        elif mover.group != "robot":
+            rows += discs_of(mover.kind, pose)
     return np.array(rows, dtype=np.float64).reshape(-1, 3)

@@ -33,9 +33,9 @@ from sim.world.times_of_day import (
     checked,
     time_of,
 )
+from slam.frames import Float
 from slam.shaped import instance, within
 
-Float = NDArray[np.float64]
 TURNED_RAD = 0.3  # rad, a door turned by less stands as it stood
 REMOVED = 0.15  # of the things put elsewhere, taken out of the building
 HOME = 0.7  # of those whose hour it is, put back to where they stood in session 0

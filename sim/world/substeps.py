@@ -26,8 +26,8 @@ from sim.core.engine import Engine, call
 from sim.core.state import Records
 from sim.sensors.lidar.windows import Noted, note
 from slam._jit import inner, uncounted
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 SUBSTEPS_PER_S = 300
 SUBSTEPS_PER_TICK = 4  # 13.33 ms: the control period of the actors and of the drive
 

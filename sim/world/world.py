@@ -32,12 +32,11 @@ from sim.world.robots import robot_of, with_robot
 from sim.world.substeps import SUBSTEPS_PER_S, SUBSTEPS_PER_TICK
 from sim.world.times_of_day import time_of
 from slam.errors import InvalidValueError, UnstableError
-from slam.frames import LaserSpec
+from slam.frames import Float, LaserSpec
 from slam.shaped import instance, one_of, within
 
 __all__ = ["SUBSTEPS_PER_S", "SUBSTEPS_PER_TICK", "World"]
 
-Float = NDArray[np.float64]
 MOVING_SPEED = 0.02  # m/s; a mover faster than this counts as moving
 
 

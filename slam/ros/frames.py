@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Iterator
-from typing import NamedTuple
+from typing import Any, NamedTuple
 
 import numpy as np
 
@@ -13,22 +13,26 @@ from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Odometry
 from slam.ros import messages as ros
+from slam.ros.link import Topic
 
 BEGAN = "/ground_truth/time"  # read by ``slam.logs.bag_topics``, too
-STATE = {  # by name their types, in the order of a bag's connections
-    BEGAN: ros.BeganMessage.KIND,
-    "/clock": ros.ClockMessage.KIND,
-    "/map": ros.MapMessage.KIND,
-    "/initialpose": ros.StartMessage.KIND,
-    "/tf_static": ros.TransformMessage.KIND,
-    "/tf": ros.TransformMessage.KIND,
-    "/odom": ros.OdometryMessage.KIND,
-    "/odom_increment": ros.IncrementMessage.KIND,
-    "/ground_truth/pose": ros.TruthMessage.KIND,
-    "/ground_truth/tf": ros.TransformMessage.KIND,
-}
-SCANS = {"/scan": ros.ScanMessage.KIND, "/scan_turn": ros.ScanMessage.KIND}
-LATCHED = frozenset((BEGAN, "/tf_static", "/map"))  # sent once, kept for who comes later
+_LATCHED: dict[str, Any] = {"latched": True, "depth": 1}  # sent once, kept for who comes later
+STATE = (  # in the order of a bag's connections
+    Topic(name=BEGAN, kind=ros.BeganMessage.KIND, **_LATCHED),
+    Topic(name="/clock", kind=ros.ClockMessage.KIND, reliable=False, depth=1),
+    Topic(name="/map", kind=ros.MapMessage.KIND, **_LATCHED),
+    Topic(name="/initialpose", kind=ros.StartMessage.KIND),
+    Topic(name="/tf_static", kind=ros.TransformMessage.KIND, **_LATCHED),
+    Topic(name="/tf", kind=ros.TransformMessage.KIND, depth=100),
+    Topic(name="/odom", kind=ros.OdometryMessage.KIND),
+    Topic(name="/odom_increment", kind=ros.IncrementMessage.KIND),
+    Topic(name="/ground_truth/pose", kind=ros.TruthMessage.KIND),
+    Topic(name="/ground_truth/tf", kind=ros.TransformMessage.KIND),
+)
+SCANS = (  # best effort, as drivers have it
+    Topic(name="/scan", kind=ros.ScanMessage.KIND, reliable=False, depth=5),
+    Topic(name="/scan_turn", kind=ros.ScanMessage.KIND, reliable=False),
+)
 
 
 class Message(NamedTuple):

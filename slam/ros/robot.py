@@ -1,15 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot on the network: frames go out as its drivers would send them."""
 
+from dataclasses import replace
+
 from slam.estimate import Raster
 from slam.frames import Frame
-from slam.ros.frames import LATCHED, SCANS, STATE, FrameMessages
+from slam.ros.frames import SCANS, STATE, FrameMessages
 from slam.ros.link import Link, Topic
 
 _RENAMED = {"/map": "/ground_truth/map"}  # "/map" is the SLAM's
 _UNSENT = frozenset(("/initialpose",))  # somebody else's to say
-_LOSSY = frozenset(("/clock", *SCANS))  # sensor data: best effort, as drivers have it
-_DEPTHS = {"/clock": 1, "/tf": 100, "/scan": 5, "/scan_turn": 10}
 
 
 def topics(*, paced: bool = False) -> dict[str, Topic]:
@@ -17,20 +17,16 @@ def topics(*, paced: bool = False) -> dict[str, Topic]:
 
     paced  whether each message is waited for: then none may be lost
     """
-    found = {}
-    for name, kind in {**STATE, **SCANS}.items():
-        if name in _UNSENT:
-            continue
-        latched = name in LATCHED
-        found[name] = Topic(
-            name=_RENAMED.get(name, name),
-            kind=kind,
-            reliable=paced or name not in _LOSSY,
+    return {
+        topic.name: replace(
+            topic,
+            name=_RENAMED.get(topic.name, topic.name),
+            reliable=paced or topic.reliable,
             waits=paced,
-            latched=latched,
-            depth=1 if latched else _DEPTHS.get(name, 10),
         )
-    return found
+        for topic in (*STATE, *SCANS)
+        if topic.name not in _UNSENT
+    }
 
 
 class Robot:

@@ -97,9 +97,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
     ``arrays`` of ``Cells``, ``View`` and the ``numbers`` of a
     ``Law`` as plain tuples: those get here sooner.
     """
-    cells, v, n = named(arrays), plain_view, numbers
-    view = View(v[0], v[1], v[2], v[3], v[4], v[5])
-    law = Law(n[0], n[1], n[2], n[3], n[4], n[5], n[6], n[7], n[8], n[9], n[10], n[11])
+    cells, view, law = named(arrays), View(*plain_view), Law(*numbers)
     confirmed, contradicted, visited = 0.0, 0.0, 0
     known, through = 0.0, 0.0
     ox, oy = T_map_laser[0], T_map_laser[1]

@@ -7,14 +7,13 @@ from the clearance field, the discs of all that moves and the angles of doors.
 
 import math
 
-from sim.actors.config import ACTORS
+from sim.actors.config import FOLLOW, HOLD, STEER, WAY
 from sim.actors.people import columns
-from sim.actors.people.right_of_way import BODY, Addresses, Crowd, Doors, Float, Int
+from sim.actors.people.right_of_way import Addresses, Crowd, Doors, Int
 from sim.core.flow import Field, clearance_at
 from sim.core.state import Record, Records
 from slam._jit import inner, uncounted
-
-SIGHT_M = ACTORS.holding.sight_m
+from slam.frames import Float
 
 
 @inner
@@ -69,7 +68,7 @@ def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
     """
     discs, count = crowd.discs, 0
     seat, held = crowd.task[i].seat, crowd.task[i].held
-    reach = 9.0 if held < 0 else SIGHT_M * SIGHT_M
+    reach = 9.0 if held < 0 else HOLD.sight_m * HOLD.sight_m
     for k in range(discs.shape[0]):
         dx, dy = discs[k].x - discs[i].x, discs[k].y - discs[i].y
         if k in (i, seat) or dx * dx + dy * dy > reach or count == len(near):
@@ -83,29 +82,18 @@ def nearby(i: int, crowd: Crowd, sides: Int, near: Int) -> int:
     return count
 
 
-_S = ACTORS.steering
-HORIZON, ACCEL, SPARE, SPARE_MPS = _S.horizon_s, _S.accel, _S.spare_m, _S.spare_mps
-APART, TOUCHING, SOON, LEAST_PACE = _S.apart_m, _S.touching, _S.soon_s, _S.least_pace
-HURRY, HURRY_MOST, HURRY_FROM = _S.hurry, _S.hurry_most, _S.hurry_from
-CHANGE, KEEP_RIGHT, SLOW = _S.change, _S.keep_right, _S.slow
-LOOK_S, WALL = _S.look_s, _S.wall
-STANDS_MPS = ACTORS.following.moving_mps
-HELD_SPARE, HELD_BRAKE = _S.held_spare_m, _S.held_brake
-CROWD_SPARE, CROWD_BRAKE = _S.crowd_spare_m, _S.crowd_brake
-
-
 @uncounted
 def impact_time(dx: float, dy: float, wx: float, wy: float, reach: float) -> float:
     """s until a point moving at (wx, wy) is within ``reach`` of (dx, dy); HORIZON if later."""
     c = dx * dx + dy * dy - reach * reach
     b = dx * wx + dy * wy
     if c <= 0.0:
-        return 0.0 if b > 0.0 else HORIZON
+        return 0.0 if b > 0.0 else STEER.horizon_s
     a = wx * wx + wy * wy
     root = b * b - a * c
     if b <= 0.0 or root <= 0.0:
-        return HORIZON
-    return min(c / (b + math.sqrt(root)), HORIZON)
+        return STEER.horizon_s
+    return min(c / (b + math.sqrt(root)), STEER.horizon_s)
 
 
 @inner
@@ -127,7 +115,7 @@ def danger(  # noqa: PLR0913 (kernel)
             weight = 1.0
         if weight <= 0.0:
             continue
-        dx, dy, reach = other.x - x, other.y - y, r + other.r + APART
+        dx, dy, reach = other.x - x, other.y - y, r + other.r + STEER.apart_m
         if other.kind == columns.PERSON:  # each takes half of the evasion
             wx, wy = 2.0 * vx - ux - other.u, 2.0 * vy - uy - other.v
         else:
@@ -135,10 +123,10 @@ def danger(  # noqa: PLR0913 (kernel)
         gap2 = dx * dx + dy * dy
         if gap2 < reach * reach:
             closing = (dx * vx + dy * vy) / math.sqrt(max(gap2, 1e-6))
-            cost += weight * TOUCHING * max(closing, 0.0)
+            cost += weight * STEER.touching * max(closing, 0.0)
         else:
             when = impact_time(dx, dy, wx, wy, reach)
-            cost += weight * (1.0 / (when + SOON) - 1.0 / (HORIZON + SOON))
+            cost += weight * (1.0 / (when + STEER.soon_s) - 1.0 / (STEER.horizon_s + STEER.soon_s))
     return cost
 
 
@@ -156,10 +144,12 @@ def choose(
     wx, wy = wanted
     x, y = discs[i].x, discs[i].y
     heading = math.atan2(wy, wx)
-    here = min(clearance_at(field, x, y), BODY)
+    here = min(clearance_at(field, x, y), WAY.body_m)
     wish = math.sqrt(wx * wx + wy * wy)
-    pace = max(wish, LEAST_PACE)
-    hurry = min(HURRY * state[i].blocked, HURRY_MOST) if wish > HURRY_FROM else 0.0
+    pace = max(wish, STEER.least_pace)
+    hurry = (
+        min(STEER.hurry * state[i].blocked, STEER.hurry_most) if wish > STEER.hurry_from else 0.0
+    )
     best, best_x, best_y = math.inf, 0.0, 0.0
     for k in range(35):
         if k == 0:
@@ -174,14 +164,14 @@ def choose(
             vx, vy = speed * math.cos(angle), speed * math.sin(angle)
         speed = math.sqrt(vx * vx + vy * vy)
         cost = math.sqrt((vx - wx) ** 2 + (vy - wy) ** 2)
-        cost += CHANGE * math.sqrt((vx - state[i].vx) ** 2 + (vy - state[i].vy) ** 2)
-        cost += KEEP_RIGHT * max(0.0, wx * vy - wy * vx)  # people keep right
-        if speed < SLOW * pace:  # who has been held up steps aside rather than stand
+        cost += STEER.change * math.sqrt((vx - state[i].vx) ** 2 + (vy - state[i].vy) ** 2)
+        cost += STEER.keep_right * max(0.0, wx * vy - wy * vx)  # people keep right
+        if speed < STEER.slow * pace:  # who has been held up steps aside rather than stand
             cost += hurry * (1.0 - speed / pace)
         for step in range(1, 3):
-            c = clearance_at(field, x + LOOK_S * step * vx, y + LOOK_S * step * vy)
+            c = clearance_at(field, x + STEER.look_s * step * vx, y + STEER.look_s * step * vy)
             if c < here:
-                cost += WALL * (here - c)
+                cost += STEER.wall * (here - c)
         if cost < best:
             cost += danger(i, vx, vy, near, discs, fade, state[i].dense)
         if cost < best:
@@ -200,9 +190,9 @@ def spare_robot(
     """
     vx, vy = wanted
     discs, held = crowd.discs, crowd.task[i].held
-    spare, brake = SPARE, ACCEL
+    spare, brake = STEER.spare_m, STEER.accel
     if crowd.state[i].dense < 1.0:
-        spare, brake = CROWD_SPARE, CROWD_BRAKE
+        spare, brake = STEER.crowd_spare_m, STEER.crowd_brake
     for k in range(len(near)):
         robot = discs[near[k]]
         if robot.kind != columns.ROBOT:
@@ -213,10 +203,12 @@ def spare_robot(
                 continue
             u, v = discs[part].u, discs[part].v
             own = math.sqrt(u * u + v * v)
-            if own < STANDS_MPS:
-                vx, vy = _spare(vx, vy, discs[part], robot, spare + HELD_SPARE, HELD_BRAKE)
+            if own < FOLLOW.moving_mps:
+                vx, vy = _spare(
+                    vx, vy, discs[part], robot, spare + STEER.held_spare_m, STEER.held_brake
+                )
                 continue
-            sx, sy = _spare(u, v, discs[part], robot, spare + HELD_SPARE, HELD_BRAKE)
+            sx, sy = _spare(u, v, discs[part], robot, spare + STEER.held_spare_m, STEER.held_brake)
             share = min(max((sx * u + sy * v) / (own * own), 0.0), 1.0)
             vx, vy = share * vx, share * vy
     return vx, vy
@@ -233,5 +225,5 @@ def _spare(
     # A person stops at ``brake``; what the robot itself comes nearer is stepped back from.
     approach = vx * ux + vy * uy - (robot.u * ux + robot.v * uy)
     allowed = math.sqrt(2.0 * brake * gap) if gap > 0.0 else 4.0 * gap
-    excess = min(max(approach - allowed, 0.0), SPARE_MPS)
+    excess = min(max(approach - allowed, 0.0), STEER.spare_mps)
     return vx - excess * ux, vy - excess * uy

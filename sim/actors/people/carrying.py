@@ -6,24 +6,18 @@ Cleaners take chairs to a row at a wall, and later back to where they stood.
 
 import math
 
-from sim.actors.config import ACTORS
+from sim.actors.config import CLEAN, HOLD, WALK
 from sim.actors.holding import Held
 from sim.actors.people import columns
 from sim.actors.people.following import in_sight, route
 from sim.actors.people.leaders import Leaders
-from sim.actors.people.right_of_way import Crowd, Float, Int
+from sim.actors.people.right_of_way import Crowd, Int
 from sim.core.flow import Field, clearance_at, time_at
 from sim.core.state import Record
 from slam._jit import inner
+from slam.frames import Float
 
 PEOPLE_STEPS = 2  # of the look ahead, in which people matter
-_H = ACTORS.holding
-STOP_M, STOP_ROBOT, STOP_WALL = _H.stop_m, _H.stop_robot_m, _H.stop_wall_m
-STEP_S, SEES_S, BACKWARDS, BACK = _H.step_s, _H.sees_s, _H.backwards_mps, _H.backwards
-HIT, CLOSE_M, CLOSE, TURNING = _H.hit, _H.close_m, _H.close, _H.turning
-SLACK, TAUT, TAUT_GAIN = _H.slack_m, _H.taut_m, _H.taut_gain
-HURRY, HURRY_MOST = _H.hurry, _H.hurry_most
-TURN_GAIN = ACTORS.walking.turn_gain
 
 
 @inner
@@ -75,18 +69,18 @@ def runs_into(  # noqa: PLR0913 (kernel)
     Chairs are pushed along, and people go out of the way in time; the robot is never touched. What
     is too near already may be left.
     """
-    discs, closest = crowd.discs, CLOSE_M
+    discs, closest = crowd.discs, HOLD.close_m
     for step in range(1, 5):
-        t = STEP_S * step
-        on = min(t, SEES_S)
+        t = HOLD.step_s * step
+        on = min(t, HOLD.sees_s)
         for p in range(len(parts)):
             part = discs[parts[p]]
             x, y = part_at(part, pivot, yaw, v, omega, t)
-            free = clearance_at(field, x, y) - part.r - STOP_WALL
+            free = clearance_at(field, x, y) - part.r - HOLD.stop_wall_m
             if free < 0.0:
                 now = clearance_at(field, part.x, part.y)
-                if free < now - part.r - STOP_WALL - 0.01:
-                    return HIT * (1.25 - 0.25 * step) ** 3
+                if free < now - part.r - HOLD.stop_wall_m - 0.01:
+                    return HOLD.hit * (1.25 - 0.25 * step) ** 3
             closest = min(closest, free)
             for k in range(len(near)):
                 other = discs[near[k]]
@@ -94,18 +88,18 @@ def runs_into(  # noqa: PLR0913 (kernel)
                 if kind == columns.CHAIR or (kind == columns.PERSON and step > PEOPLE_STEPS):
                     continue
                 apart = part.r + other.r
-                apart += STOP_ROBOT if kind == columns.ROBOT else STOP_M
+                apart += HOLD.stop_robot_m if kind == columns.ROBOT else HOLD.stop_m
                 dx = other.x + on * other.u - x
                 dy = other.y + on * other.v - y
-                if dx * dx + dy * dy < (apart + CLOSE_M) ** 2:
+                if dx * dx + dy * dy < (apart + HOLD.close_m) ** 2:
                     free = math.sqrt(dx * dx + dy * dy) - apart
                     if free < 0.0:
                         nx, ny = other.x - part.x, other.y - part.y
                         if free < math.sqrt(nx * nx + ny * ny) - apart - 0.01:
-                            cost = HIT * (1.25 - 0.25 * step) ** 3
+                            cost = HOLD.hit * (1.25 - 0.25 * step) ** 3
                             return 10.0 * cost if kind == columns.ROBOT else cost
                     closest = min(closest, free)
-    return CLOSE * (CLOSE_M - closest)
+    return HOLD.close * (HOLD.close_m - closest)
 
 
 @inner
@@ -131,25 +125,25 @@ def pushes(  # noqa: PLR0913 (kernel)
     here = time_at(field, goal, me.x, me.y)
     ahead = min(time_at(field, goal, tip.x, tip.y), here + 5.0)
     standing = runs_into(0.0, 0.0, parts, pivot, yaw, near, field, crowd)
-    best, best_v, best_omega = ahead + min(standing, CLOSE * CLOSE_M), 0.0, 0.0
+    best, best_v, best_omega = ahead + min(standing, HOLD.close * HOLD.close_m), 0.0, 0.0
     for a in range(-1, 4):
-        v = pace * a / 3.0 if a >= 0 else -min(pace, BACKWARDS)
+        v = pace * a / 3.0 if a >= 0 else -min(pace, HOLD.backwards_mps)
         for b in range(-2, 3):
             omega = 0.5 * b * crowd.state[i].turn_rate
             if a < 0:
-                x, y = part_at(me, pivot, yaw, v, omega, 4.0 * STEP_S)
-                cost = ahead - BACK * max(here - time_at(field, goal, x, y), -1.0)
+                x, y = part_at(me, pivot, yaw, v, omega, 4.0 * HOLD.step_s)
+                cost = ahead - HOLD.backwards * max(here - time_at(field, goal, x, y), -1.0)
             else:
-                x, y = part_at(tip, pivot, yaw, v, omega, 4.0 * STEP_S)
+                x, y = part_at(tip, pivot, yaw, v, omega, 4.0 * HOLD.step_s)
                 cost = min(time_at(field, goal, x, y), here + 5.0)
-            cost += TURNING * abs(omega)
+            cost += HOLD.turning * abs(omega)
             if v != 0.0 or omega != 0.0:  # who is held up rather backs out or turns than stands
-                cost -= min(HURRY * crowd.state[i].blocked, HURRY_MOST)
+                cost -= min(HOLD.hurry * crowd.state[i].blocked, HOLD.hurry_most)
             if cost < best:
                 cost += runs_into(v, omega, parts, pivot, yaw, near, field, crowd)
             if cost < best:
                 best, best_v, best_omega = cost, v, omega
-    crowd.state[i].look = yaw + best_omega / TURN_GAIN
+    crowd.state[i].look = yaw + best_omega / WALK.turn_gain
     vx = best_v * math.cos(yaw) - best_omega * (me.y - pivot.y)
     return vx, best_v * math.sin(yaw) + best_omega * (me.x - pivot.x)
 
@@ -176,18 +170,12 @@ def keep_hold(
             ex -= px * (c - ct)
             ey -= px * (s - st)
         far = math.sqrt(ex * ex + ey * ey)
-        if far < SLACK:
+        if far < HOLD.slack_m:
             continue
         away = (vx * ex + vy * ey) / far
-        excess = max(away - TAUT_GAIN * (TAUT - far), 0.0)
+        excess = max(away - HOLD.taut_gain * (HOLD.taut_m - far), 0.0)
         vx, vy = vx - excess * ex / far, vy - excess * ey / far
     return vx, vy
-
-
-_C = ACTORS.cleaning
-REACH, NEAR, REST_S = _C.hand_m, _C.near_m, _C.rest_s
-PACE, THERE, TRIP_S = _C.pace_mps, _C.there_m, _C.trip_s
-GIVES_UP_S = ACTORS.walking.blocked_s
 
 
 @inner
@@ -196,7 +184,7 @@ def next_chair(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> int:
 
     Those that stand in a row of chairs stay there.
     """
-    discs, task, best, found = crowd.discs, crowd.task, REACH * REACH, -1
+    discs, task, best, found = crowd.discs, crowd.task, CLEAN.hand_m * CLEAN.hand_m, -1
     x, y = discs[i].x, discs[i].y
     for k in range(len(crowd.yaws)):
         if discs[k].kind != columns.CHAIR:
@@ -236,7 +224,7 @@ def next_turn(i: int, time: float, leaders: Leaders, crowd: Crowd) -> None:
     n = int(leaders.lines[crowd.task[i].first].places)
     crowd.task[i].place = (crowd.task[i].place + 1) % (2 * n)
     crowd.task[i].walking, crowd.task[i].held = columns.CLEANS, -1
-    crowd.state[i].free_at, crowd.state[i].blocked = time + REST_S, 0.0
+    crowd.state[i].free_at, crowd.state[i].blocked = time + CLEAN.rest_s, 0.0
 
 
 @inner
@@ -257,7 +245,7 @@ def to_what_is_taken(
     tx, ty = route(i, tx, ty, field, crowd)
     dx, dy = tx - x, ty - y
     far = math.sqrt(dx * dx + dy * dy)
-    speed = min(PACE, 1.5 * far) / max(far, 1e-6)
+    speed = min(CLEAN.pace_mps, 1.5 * far) / max(far, 1e-6)
     return speed * dx + 0.0, speed * dy + 0.0
 
 
@@ -318,12 +306,12 @@ def clean(  # noqa: C901, PLR0913 (kernel)
             find_work(i, time, field, leaders, crowd)
         return
     place = row_place(i, leaders, crowd)
-    late = state[i].blocked > GIVES_UP_S or time - state[i].best_at > TRIP_S
+    late = state[i].blocked > WALK.blocked_s or time - state[i].best_at > CLEAN.trip_s
     dx = crowd.discs[row].x - crowd.discs[i].x
     dy = crowd.discs[row].y - crowd.discs[i].y
     if doing == columns.TO_CHAIR:
         reach = crowd.discs[i].r + crowd.discs[row].r
-        if math.sqrt(dx * dx + dy * dy) - reach < NEAR:
+        if math.sqrt(dx * dx + dy * dy) - reach < CLEAN.near_m:
             held.at[hand].qb, held.at[hand].vb = at[row, 0], at[row, 1]
             held.bodies[hand, 0], held.bodies[hand, 1] = weights[row, 0], weights[row, 1]
             held.pose[hand, 0], held.pose[hand, 1] = reach + 0.04, 0.0
@@ -338,7 +326,7 @@ def clean(  # noqa: C901, PLR0913 (kernel)
     filling = fills(i, leaders, crowd)
     tx, ty = (line.x, line.y) if filling else (line.home_x, line.home_y)
     tx, ty = tx - crowd.discs[row].x, ty - crowd.discs[row].y
-    if late or tx * tx + ty * ty < THERE * THERE:
+    if late or tx * tx + ty * ty < CLEAN.there_m * CLEAN.there_m:
         held.at[hand].dropped = held.at[hand].vb
         held.at[hand].qb = held.at[hand].vb = -1
         if not filling:

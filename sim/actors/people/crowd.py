@@ -10,10 +10,10 @@ patience and pushes it; now and then one sits down (``sim.actors.people.trips``)
 import math
 from typing import NamedTuple
 
-from sim.actors.config import ACTORS
+from sim.actors.config import DOORS, STEER, WALK
 from sim.actors.holding import Held
 from sim.actors.people import columns
-from sim.actors.people.avoidance import ACCEL, choose, nearby, sense, spare_robot
+from sim.actors.people.avoidance import choose, nearby, sense, spare_robot
 from sim.actors.people.carrying import clean, keep_hold, pushes, to_what_is_taken
 from sim.actors.people.following import (
     faces,
@@ -29,11 +29,9 @@ from sim.actors.people.following import (
 )
 from sim.actors.people.leaders import Leaders, note_ways
 from sim.actors.people.right_of_way import (
-    OPEN,
     Addresses,
     Crowd,
     Doors,
-    Float,
     Int,
     give_turns,
     hold_off,
@@ -44,14 +42,10 @@ from sim.actors.people.trips import Hulls, on_chair, patience, plan, to_chair
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from sim.core.state import Records
 from slam._jit import inner
+from slam.frames import Float
 
-_W = ACTORS.walking
-_S = ACTORS.steering
-STILL = _W.still_mps
 NEAR, CROWD_NEAR = 24, 64  # discs around one that are looked at, without and with a crowd
 PARTS = 8  # most discs of one and of what it pushes
-LANE_HALF, LANE, LANE_SIDE, LANE_WALL = _S.lane_half_m, _S.lane, _S.lane_side_m, _S.lane_wall_m
-TURN_GAIN = _W.turn_gain
 
 
 class People(NamedTuple):
@@ -117,7 +111,7 @@ def at_doors(
             continue
         if turn != 0.0 and side != turn:
             wx, wy = wait_beside(i, ways.doors[d], side, field, discs)
-        elif ways.doors[d].angle < OPEN:
+        elif ways.doors[d].angle < DOORS.passable_rad:
             wx, wy = hold_off(i, d, (wx, wy), ways, discs)
     return wx, wy
 
@@ -127,12 +121,15 @@ def keep_right(i: int, wx: float, wy: float, field: Field, discs: Records) -> tu
     """The wanted velocity of one of a stream, which keeps to the right side of a corridor."""
     x, y = discs[i].x, discs[i].y
     speed = math.sqrt(wx * wx + wy * wy)
-    if speed < STILL or clearance_at(field, x, y) > LANE_HALF:
+    if speed < WALK.still_mps or clearance_at(field, x, y) > STEER.lane_half_m:
         return wx, wy
     rx, ry = wy / speed, -wx / speed
-    if clearance_at(field, x + LANE_SIDE * rx, y + LANE_SIDE * ry) < LANE_WALL:
+    if (
+        clearance_at(field, x + STEER.lane_side_m * rx, y + STEER.lane_side_m * ry)
+        < STEER.lane_wall_m
+    ):
         return wx, wy
-    return wx + LANE * speed * rx, wy + LANE * speed * ry
+    return wx + STEER.lane * speed * rx, wy + STEER.lane * speed * ry
 
 
 @inner
@@ -147,7 +144,7 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     state, yaw = crowd.state, crowd.yaws[i]
     dvx, dvy = vx - state[i].vx, vy - state[i].vy
     change = math.sqrt(dvx * dvx + dvy * dvy)
-    share = min(1.0, ACCEL * tick / change) if change > 0.0 else 0.0
+    share = min(1.0, STEER.accel * tick / change) if change > 0.0 else 0.0
     state[i].vx += share * dvx
     state[i].vy += share * dvy
     heading, most = yaw, state[i].turn_rate
@@ -158,7 +155,7 @@ def steer(i: int, tick: float, vx: float, vy: float, crowd: Crowd, out: Float) -
     elif crowd.task[i].walking in (columns.STANDS, columns.FOLLOWS, columns.QUEUES):
         heading = state[i].look
     out[0], out[1] = state[i].vx, state[i].vy
-    out[2] = min(max(TURN_GAIN * wrap(heading - yaw), -most), most)
+    out[2] = min(max(WALK.turn_gain * wrap(heading - yaw), -most), most)
 
 
 @inner
@@ -184,7 +181,7 @@ def wish(i: int, time: float, tick: float, people: People) -> tuple[float, float
     else:
         wx, wy = to_what_is_taken(i, field, people.leaders, crowd, people.held)
     if wx * wx + wy * wy > 0.09:
-        still = crowd.discs[i].u ** 2 + crowd.discs[i].v ** 2 < STILL * STILL
+        still = crowd.discs[i].u ** 2 + crowd.discs[i].v ** 2 < WALK.still_mps * WALK.still_mps
         # Who stands still with the leader has nowhere to get on to.
         waits = still and doing == columns.FOLLOWS and near_place(i, people.leaders, crowd)
         state[i].walked_s += 0.0 if waits else tick

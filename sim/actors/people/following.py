@@ -10,18 +10,13 @@ held up. Who is held up near the place rests there for a while.
 
 import math
 
-from sim.actors.config import ACTORS
+from sim.actors.config import FOLLOW, WALK
 from sim.actors.people import columns
-from sim.actors.people.leaders import CRUMB, CRUMBS, MOVING, Leaders
+from sim.actors.people.leaders import CRUMBS, Leaders
 from sim.actors.people.right_of_way import Crowd
 from sim.core.flow import FAR, Field, clearance_at, time_at, way_at
 from slam._jit import inner
 
-_F = ACTORS.following
-GIVE_WAY_S, STEP_BACK, STEP_BACK_M = _F.give_way_s, _F.step_back, _F.step_back_m
-MARGIN, SIGHT, WIDE = _F.margin_m, _F.sight_m, _F.wide_m
-NARROW, NARROW_SIDE, CROSSING = _F.narrow_m, _F.narrow_side_m, _F.crossing_m2
-STANDS_S, STANDS_M, NEAR_M = _F.stands_s, _F.stands_m, _F.near_m
 BEHIND = -0.5  # m; a place farther behind is one on the leader's way
 
 
@@ -32,7 +27,7 @@ def in_sight(field: Field, x: float, y: float, tx: float, ty: float) -> bool:
     far = math.sqrt(dx * dx + dy * dy)
     steps = int(far / 0.15) + 1
     for k in range(1, steps + 1):
-        if clearance_at(field, x + dx * k / steps, y + dy * k / steps) < SIGHT:
+        if clearance_at(field, x + dx * k / steps, y + dy * k / steps) < FOLLOW.sight_m:
             return False
     return True
 
@@ -43,7 +38,7 @@ def through_door(field: Field, x: float, y: float, tx: float, ty: float) -> bool
     dx, dy = tx - x, ty - y
     steps = int(math.sqrt(dx * dx + dy * dy) / 0.15)
     for k in range(steps // 4 + 2, steps - steps // 4 - 1):
-        if clearance_at(field, x + dx * k / steps, y + dy * k / steps) < WIDE:
+        if clearance_at(field, x + dx * k / steps, y + dy * k / steps) < FOLLOW.wide_m:
             return True
     return False
 
@@ -75,8 +70,8 @@ def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
     ahead, left = crowd.state[i].ahead, crowd.state[i].left
     far = math.sqrt(ahead * ahead + left * left)
     clear = clearance_at(field, disc.x, disc.y)
-    if clear < NARROW:  # those beside it go in file, those ahead keep between the walls
-        room = max(clear - NARROW_SIDE, 0.1)
+    if clear < FOLLOW.narrow_m:  # those beside it go in file, those ahead keep between the walls
+        room = max(clear - FOLLOW.narrow_side_m, 0.1)
         if ahead <= 0.5:
             ahead = -float(crowd.state[i].file)
         elif abs(left) > room:
@@ -84,16 +79,18 @@ def place_of(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tu
             left = room if left > 0.0 else -room
         far = math.sqrt(ahead * ahead + left * left)
     if ahead < BEHIND:  # on the way that the leader has come
-        back = min(int(-ahead / CRUMB), int(course.count) - 1)
+        back = min(int(-ahead / FOLLOW.crumb_m), int(course.count) - 1)
         at = (int(course.last) - back) % CRUMBS
         return float(leaders.trail[k, at, 0]), float(leaders.trail[k, at, 1])
-    back_off = min(max(course.stood - GIVE_WAY_S, 0.0) * STEP_BACK, STEP_BACK_M)
+    back_off = min(
+        max(course.stood - FOLLOW.give_way_s, 0.0) * FOLLOW.step_back, FOLLOW.step_back_m
+    )
     far += back_off
     angle = course.heading + math.atan2(left, ahead)
     c, s = math.cos(angle), math.sin(angle)
     x, y, reach = disc.x, disc.y, 0.0
     while reach + 0.1 <= far:
-        if clearance_at(field, x + (reach + 0.1) * c, y + (reach + 0.1) * s) < MARGIN:
+        if clearance_at(field, x + (reach + 0.1) * c, y + (reach + 0.1) * s) < FOLLOW.margin_m:
             break
         reach += 0.1
     return x + reach * c, y + reach * s
@@ -120,7 +117,7 @@ def spread_out(field: Field, leaders: Leaders, crowd: Crowd) -> None:
             one, two = state[i], state[j]
             gain = _crossing(discs[i].x, discs[j].x, one.spot_x, two.spot_x)
             gain += _crossing(discs[i].y, discs[j].y, one.spot_y, two.spot_y)
-            if gain > CROSSING:
+            if gain > FOLLOW.crossing_m2:
                 one.ahead, two.ahead = two.ahead, one.ahead
                 one.left, two.left = two.left, one.left
                 one.file, two.file = two.file, one.file
@@ -133,7 +130,7 @@ def in_file(i: int, k: int, field: Field, leaders: Leaders, crowd: Crowd) -> tup
     """Where person ``i`` goes who does not see its place: in file on the way of leader ``k``."""
     x, y = crowd.discs[i].x, crowd.discs[i].y
     course, count = leaders.course[k], int(leaders.course[k].count)
-    own = min(int(crowd.state[i].file / CRUMB), count - 1)
+    own = min(int(crowd.state[i].file / FOLLOW.crumb_m), count - 1)
     for step in range(count):  # one's own place, then those behind it, then those before it
         back = own + step if own + step < count else count - 1 - step
         at = (int(course.last) - back) % CRUMBS
@@ -150,7 +147,7 @@ def near_place(i: int, leaders: Leaders, crowd: Crowd) -> bool:
     Farther off will do while the leader stands.
     """
     k = crowd.task[i].leader
-    reach = STANDS_M if leaders.course[k].stood > STANDS_S else NEAR_M
+    reach = FOLLOW.stands_m if leaders.course[k].stood > FOLLOW.stands_s else FOLLOW.near_m
     leader = crowd.discs[leaders.rows[k]]
     lx = leader.x - crowd.discs[i].x
     ly = leader.y - crowd.discs[i].y
@@ -173,15 +170,6 @@ def taken(i: int, x: float, y: float, crowd: Crowd) -> bool:
     return False
 
 
-FASTEST, THERE, SERVED_S, GAIN = _F.fastest_mps, _F.there_m, _F.served_s, _F.gain
-WAY_M, WAY_HALF, ASIDE = _F.way_m, _F.way_half_m, _F.aside_mps
-TAKEN_M, ASKED_S = _F.taken_m, _F.asked_s
-ROOM_M, ROOM_PUSH_M, ROOM_HALF = _F.room_m, _F.room_push_m, _F.room_half_m
-FILE_M, FILE_GAP, FILE_HALF = _F.file_m, _F.file_gap_m, _F.file_half
-TURN_MOST = ACTORS.walking.turn_most
-HELD_UP_S, REST_S = _F.held_up_s, _F.rest_s
-
-
 @inner
 def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float, float]:
     """The velocity with which person ``i`` would like to keep its place."""
@@ -195,7 +183,7 @@ def follow(i: int, field: Field, leaders: Leaders, crowd: Crowd) -> tuple[float,
         tx, ty = in_file(i, k, field, leaders, crowd)
     crowd.state[i].arrive, crowd.state[i].luck = tx, ty
     far = math.sqrt((tx - x) ** 2 + (ty - y) ** 2)
-    if far < TAKEN_M and taken(i, tx, ty, crowd):  # as near as one gets
+    if far < FOLLOW.taken_m and taken(i, tx, ty, crowd):  # as near as one gets
         return share_of(far) * u, share_of(far) * v
     return to_place(tx - x, ty - y, u, v)
 
@@ -210,12 +198,12 @@ def share_of(far: float) -> float:
 def to_place(dx: float, dy: float, u: float, v: float) -> tuple[float, float]:
     """Velocity to a place (dx, dy) m away that itself moves at (u, v)."""
     far = math.sqrt(dx * dx + dy * dy)
-    if far < THERE and u * u + v * v < MOVING * MOVING:
+    if far < FOLLOW.there_m and u * u + v * v < FOLLOW.moving_mps * FOLLOW.moving_mps:
         return 0.0, 0.0
     share = share_of(far)
-    wx, wy = share * u + GAIN * dx, share * v + GAIN * dy
+    wx, wy = share * u + FOLLOW.gain * dx, share * v + FOLLOW.gain * dy
     speed = math.sqrt(wx * wx + wy * wy)
-    over = max(speed / FASTEST, 1.0)
+    over = max(speed / FOLLOW.fastest_mps, 1.0)
     return wx / over + 0.0, wy / over + 0.0
 
 
@@ -231,7 +219,9 @@ def wait_behind(
     k, discs, task = crowd.task[i].leader, crowd.discs, crowd.task
     x, y = discs[i].x, discs[i].y
     speed = math.sqrt(wanted[0] ** 2 + wanted[1] ** 2)
-    if speed < THERE or (leaders.course[k].stood < STANDS_S and clearance_at(field, x, y) > NARROW):
+    if speed < FOLLOW.there_m or (
+        leaders.course[k].stood < FOLLOW.stands_s and clearance_at(field, x, y) > FOLLOW.narrow_m
+    ):
         return wanted
     c, s, most = wanted[0] / speed, wanted[1] / speed, speed
     row = leaders.rows[k]
@@ -245,9 +235,9 @@ def wait_behind(
             continue
         ahead, left = c * (ox - x) + s * (oy - y), c * (oy - y) - s * (ox - x)
         reach = discs[i].r + discs[other].r
-        if 0.0 < ahead < reach + FILE_M and abs(left) < FILE_HALF * reach:
+        if 0.0 < ahead < reach + FOLLOW.file_m and abs(left) < FOLLOW.file_half * reach:
             before = max(discs[other].u * c + discs[other].v * s, 0.0)
-            most = min(most, before + GAIN * max(ahead - reach - FILE_GAP, 0.0))
+            most = min(most, before + FOLLOW.gain * max(ahead - reach - FOLLOW.file_gap_m, 0.0))
     return most * c, most * s
 
 
@@ -267,18 +257,18 @@ def make_way(
     dx = crowd.discs[i].x - robot.x
     dy = crowd.discs[i].y - robot.y
     ahead, left = c * dx + s * dy, c * dy - s * dx
-    if ahead < 0.0 or ahead > WAY_M or abs(left) > WAY_HALF:
+    if ahead < 0.0 or ahead > FOLLOW.way_m or abs(left) > FOLLOW.way_half_m:
         return wanted
     side = 1.0 if left >= 0.0 else -1.0
-    narrow = clearance_at(field, crowd.discs[i].x, crowd.discs[i].y) < NARROW
-    along = max(wanted[0] * c + wanted[1] * s, ASIDE if narrow else 0.3)
-    return along * c - side * ASIDE * s, along * s + side * ASIDE * c
+    narrow = clearance_at(field, crowd.discs[i].x, crowd.discs[i].y) < FOLLOW.narrow_m
+    along = max(wanted[0] * c + wanted[1] * s, FOLLOW.aside_mps if narrow else 0.3)
+    return along * c - side * FOLLOW.aside_mps * s, along * s + side * FOLLOW.aside_mps * c
 
 
 @inner
 def is_pushing(i: int, crowd: Crowd) -> bool:
     """Whether person ``i`` has something long before it, and not lost it since."""
-    return bool(crowd.task[i].held >= 0 and crowd.state[i].turn_rate < TURN_MOST)
+    return bool(crowd.task[i].held >= 0 and crowd.state[i].turn_rate < WALK.turn_most)
 
 
 @inner
@@ -288,20 +278,20 @@ def make_room(
     """The velocity of person ``i``, sideways where it stands in the way of one who is held up."""
     discs, task, state = crowd.discs, crowd.task, crowd.state
     for j in range(len(task)):
-        if task[j].walking != columns.WALKS or state[j].blocked < ASKED_S:
+        if task[j].walking != columns.WALKS or state[j].blocked < FOLLOW.asked_s:
             continue
         dx, dy = discs[i].x - discs[j].x, discs[i].y - discs[j].y
         pushing = is_pushing(j, crowd)
-        reach = ROOM_PUSH_M if pushing else ROOM_M
+        reach = FOLLOW.room_push_m if pushing else FOLLOW.room_m
         if dx * dx + dy * dy > reach * reach:
             continue
         c, s = math.cos(crowd.yaws[j]), math.sin(crowd.yaws[j])
         if not pushing:
             c, s = way_at(field, task[j].goal, discs[j].x, discs[j].y)
         ahead, left = c * dx + s * dy, c * dy - s * dx
-        if ahead > 0.0 and abs(left) < ROOM_HALF:
+        if ahead > 0.0 and abs(left) < FOLLOW.room_half_m:
             side = 1.0 if left >= 0.0 else -1.0
-            return wanted[0] - side * ASIDE * s, wanted[1] + side * ASIDE * c
+            return wanted[0] - side * FOLLOW.aside_mps * s, wanted[1] + side * FOLLOW.aside_mps * c
     return wanted
 
 
@@ -311,8 +301,8 @@ def rests(i: int, time: float, leaders: Leaders, crowd: Crowd) -> bool:
     state = crowd.state[i]
     if time < state.best_at:
         return True
-    if state.blocked > HELD_UP_S and near_place(i, leaders, crowd):
-        state.best_at, state.blocked = time + REST_S, 0.0
+    if state.blocked > FOLLOW.held_up_s and near_place(i, leaders, crowd):
+        state.best_at, state.blocked = time + FOLLOW.rest_s, 0.0
         return True
     return False
 
@@ -323,7 +313,7 @@ def stand_in_line(i: int, time: float, leaders: Leaders, crowd: Crowd) -> tuple[
     place = crowd.task[i].place
     first = crowd.task[i].first
     n = int(leaders.lines[first].places)
-    now = (place - int(time / SERVED_S)) % n
+    now = (place - int(time / FOLLOW.served_s)) % n
     tx, ty = leaders.lines[first + now].x, leaders.lines[first + now].y
     dx, dy = tx - crowd.discs[i].x, ty - crowd.discs[i].y
     return to_place(dx, dy, 0.0, 0.0)

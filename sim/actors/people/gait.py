@@ -14,8 +14,8 @@ from numpy.typing import NDArray
 
 from sim.core.state import Records
 from slam._jit import inner, njit, uncounted
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 
 # columns of the state of the feet, (n, 8): feet l, r (x, y), phase of the swing in [0, 1], pause in

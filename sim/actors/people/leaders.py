@@ -11,14 +11,13 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.actors.config import ACTORS
+from sim.actors.config import FOLLOW
 from sim.actors.people import columns
-from sim.actors.people.right_of_way import Crowd, Float, Int
+from sim.actors.people.right_of_way import Crowd, Int
 from sim.core.state import Records, flat
 from slam._jit import inner
+from slam.frames import Float
 
-_F = ACTORS.following
-CRUMB, COURSE_RATE, MOVING = _F.crumb_m, _F.course_rate, _F.moving_mps
 CRUMBS = 160  # remembered of each leader: 40 m
 
 
@@ -64,11 +63,11 @@ def note_ways(tick: float, leaders: Leaders, crowd: Crowd) -> None:
             course.heading = crowd.yaws[leaders.rows[k]]
         last = int(course.last)
         dx, dy = x - leaders.trail[k, last, 0], y - leaders.trail[k, last, 1]
-        if course.count == 0.0 or dx * dx + dy * dy > CRUMB * CRUMB:
+        if course.count == 0.0 or dx * dx + dy * dy > FOLLOW.crumb_m * FOLLOW.crumb_m:
             last = (last + 1) % CRUMBS
             leaders.trail[k, last, 0], leaders.trail[k, last, 1] = x, y
             course.last, course.count = last, min(course.count + 1.0, CRUMBS)
-        moves = u * u + v * v > MOVING * MOVING
+        moves = u * u + v * v > FOLLOW.moving_mps * FOLLOW.moving_mps
         course.stood = 0.0 if moves else course.stood + tick
         towards = course.heading
         if disc.kind == columns.ROBOT:  # shows where it will go before it does
@@ -77,4 +76,4 @@ def note_ways(tick: float, leaders: Leaders, crowd: Crowd) -> None:
             towards = math.atan2(v, u)
         turn = towards - course.heading
         turn -= 2.0 * math.pi * math.floor((turn + math.pi) / (2.0 * math.pi))
-        course.heading += min(max(turn, -COURSE_RATE * tick), COURSE_RATE * tick)
+        course.heading += min(max(turn, -FOLLOW.course_rate * tick), FOLLOW.course_rate * tick)

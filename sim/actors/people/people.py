@@ -14,7 +14,7 @@ from scenes.assembly import LIMBS
 from scenes.kinds import kind_of
 from scenes.scene import Role, Scene
 from sim.actors import holding
-from sim.actors.config import ACTORS
+from sim.actors.config import HOLD, STEER, WALK
 from sim.actors.doors import Doors
 from sim.actors.people import columns, crowd, gait, right_of_way, trips
 from sim.actors.people.leaders import Leaders, arrays, leaders_of
@@ -23,8 +23,8 @@ from sim.core.bodies import Bodies
 from sim.core.flow import Field, FlowMap, nowhere
 from sim.core.seeds import between, normal, uniform
 from sim.core.state import flat
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 FILE_FIRST, FILE_STEP = 0.95, 0.65  # m behind a leader, of the first in file and each after it
 NODE_M, LARGE_NODE_M = 0.1, 0.2  # m between the nodes of a flow map: usually, and of a large floor
 LARGE_M2 = 1e5  # m2 of floor times goals from which on a floor is large: 240 MB of nodes
@@ -70,7 +70,7 @@ class People:
     """Everybody in a room, as ``table`` for the kernels.
 
     stay_mean  s at a goal; infinite: nobody moves at all
-    pace       factor on the preferred speeds, N(1.34, 0.26) m/s clipped to 0.8..1.9 (PedSim)
+    pace       factor on the preferred speeds (``sim.actors.config.WalkingConfig``)
     """
 
     def __init__(
@@ -123,7 +123,7 @@ class People:
             role = _role(scene, name)
             state[["stays", "slow", "ahead", "left"]][i] = role.stay, role.slow, *role.slot
             if scene.roles:
-                state["dense"][i] = ACTORS.steering.dense
+                state["dense"][i] = STEER.dense
             if role.goals:
                 self.crowd.allowed[i] = [goal in role.goals for goal in goals]
             if role.places:
@@ -143,7 +143,7 @@ class People:
                 i = self.names.index(hold.holder)
                 task["held"][i] = planar.index(hold.held)
                 if not hold.hinged:
-                    state["turn_rate"][i] = ACTORS.holding.turn_most
+                    state["turn_rate"][i] = HOLD.turn_most
         return leaders_of([planar.index(name) for name in leaders], lines.rows)
 
     def for_kernels(self) -> crowd.People:
@@ -158,37 +158,32 @@ class People:
         """
         state, task, draws = self.crowd.state, self.crowd.task, self.crowd.draws
         for i in range(len(self.names)):
-            numbers = ACTORS.walking
-            speed = numbers.speed_mps + numbers.speed_sd * normal(draws, i)
-            state["speed"][i] = min(max(speed, numbers.speed_least), numbers.speed_most)
-            first = min(self._rates[0], numbers.first_stay_s)
+            speed = WALK.speed_mps + WALK.speed_sd * normal(draws, i)
+            state["speed"][i] = min(max(speed, WALK.speed_least), WALK.speed_most)
+            first = min(self._rates[0], WALK.first_stay_s)
             state["stay_until"][i] = first * uniform(draws, i)
             state["look"][i] = data.qpos[self.table.torsos[i, 0] + 2]
-            look = between(draws, i, numbers.look_least_s, numbers.look_most_s)
-            state["look_until"][i] = look
+            state["look_until"][i] = between(draws, i, WALK.look_least_s, WALK.look_most_s)
             n_goals = max(len(self.table.field.times), 1)
-            goal = int(uniform(draws, i) * n_goals)
-            task["goal"][i] = goal
+            task["goal"][i] = int(uniform(draws, i) * n_goals)
         state["stay_until"][len(self.names) - waiting :] = math.inf
         self.stand(data)
 
     def enter(self, data: mujoco.MjData, name: str, time_s: float) -> None:
         """Somebody who waited stands where ``data`` says and sets off."""
-        i, t = self.names.index(name), self.table
-        self.crowd.state["stay_until"][i] = time_s
-        gait.stand(data.qpos, t.torsos[i : i + 1], self.feet[i : i + 1])
-        physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
-        gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.crowd.state, mocap)
+        self.crowd.state["stay_until"][self.names.index(name)] = time_s
+        self.stand(data, name)
 
     def dress(self) -> None:
         """Let the model follow who sits: hulls that meet no chair, torsos lowered."""
         trips.dress(self.crowd, self.table.hulls)
 
-    def stand(self, data: mujoco.MjData) -> None:
-        """Put everybody's feet under them where ``data`` says they are."""
+    def stand(self, data: mujoco.MjData, name: str = "") -> None:
+        """Put everybody's feet, or those of one, under them where ``data`` says they are."""
         if self.names:
-            t = self.table
-            gait.stand(data.qpos, t.torsos, self.feet)
+            first = self.names.index(name) if name else 0
+            rows, t = slice(first, first + 1 if name else None), self.table
+            gait.stand(data.qpos, t.torsos[rows], self.feet[rows])
             physics, mocap = (data.qpos, data.qvel), (data.mocap_pos, data.mocap_quat)
             gait.walk(0.0, physics, t.torsos, t.limbs, self.feet, t.crowd.state, mocap)
 
@@ -235,7 +230,7 @@ def _crowd(
     )
     crowd.task["walking"] = crowd.task["goal"] = 0
     crowd.state["stays"] = crowd.state["slow"] = crowd.state["dense"] = 1.0
-    crowd.state["turn_rate"] = ACTORS.walking.turn_most
+    crowd.state["turn_rate"] = WALK.turn_most
     return crowd
 
 

@@ -10,24 +10,14 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.actors.config import ACTORS
+from sim.actors.config import DOORS, FOLLOW, WAY
 from sim.actors.people import columns
 from sim.core.flow import Field, clearance_at, time_at, way_at
 from sim.core.state import Record, Records
 from slam._jit import inner
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
-
-_R = ACTORS.right_of_way
-BODY, OPEN = _R.body_m, ACTORS.doors.passable_rad
-WANTS, IN_DOORWAY, ON_WAY, SWEPT = _R.wants_m, _R.in_doorway_m, _R.on_way, _R.swept_m2
-CLEAR, IN_FRAME, KEPT = ACTORS.doors.clear_m, _R.in_frame_m, _R.kept_m
-PULL, PUSH, BESIDE, BACK = _R.pull_m, _R.push_m, _R.beside_m, _R.back_m
-WAIT_MPS, WAIT_GAIN, LEAF_M = _R.wait_mps, _R.wait_gain, _R.leaf_m
-ROUND, ROUND_END = _R.round_m, _R.round_end_m
-ASKS = ACTORS.following.asks_m
-PUSH_STOP, QUEUE, HOLD_GAIN, HOLD_MPS = _R.push_stop_m, _R.queue_m, _R.hold_gain, _R.hold_mps
 
 
 class Crowd(NamedTuple):
@@ -77,15 +67,15 @@ def wants_through(i: int, door: Record, field: Field, crowd: Crowd) -> int:
     discs, task = crowd.discs, crowd.task
     dx, dy = discs[i].x - door.cx, discs[i].y - door.cy
     distance = math.sqrt(dx * dx + dy * dy)
-    if task[i].walking != columns.WALKS or distance > WANTS:
+    if task[i].walking != columns.WALKS or distance > WAY.wants_m:
         return 0
     goal = task[i].goal
     normal = dx * door.nx + dy * door.ny
-    if distance < IN_DOORWAY:
+    if distance < WAY.in_doorway_m:
         wx, wy = way_at(field, goal, discs[i].x, discs[i].y)
         return -1 if wx * door.nx + wy * door.ny > 0.0 else 1
     there = time_at(field, goal, door.cx, door.cy)
-    if time_at(field, goal, discs[i].x, discs[i].y) - there < ON_WAY * distance:
+    if time_at(field, goal, discs[i].x, discs[i].y) - there < WAY.on_way * distance:
         return 0
     return 1 if normal > 0.0 else -1
 
@@ -94,7 +84,7 @@ def wants_through(i: int, door: Record, field: Field, crowd: Crowd) -> int:
 def follows_through(i: int, door: Record, crowd: Crowd) -> int:
     """The same of person ``i`` who follows somebody, by the next place on its way."""
     dx, dy = crowd.discs[i].x - door.cx, crowd.discs[i].y - door.cy
-    if crowd.task[i].walking != columns.FOLLOWS or dx * dx + dy * dy > WANTS * WANTS:
+    if crowd.task[i].walking != columns.FOLLOWS or dx * dx + dy * dy > WAY.wants_m * WAY.wants_m:
         return 0
     tx = crowd.state[i].arrive - door.cx
     ty = crowd.state[i].luck - door.cy
@@ -104,7 +94,7 @@ def follows_through(i: int, door: Record, crowd: Crowd) -> int:
         return 0
     share = here / (here - there)
     along = (dx + share * (tx - dx)) * door.ex + (dy + share * (ty - dy)) * door.ey
-    if abs(along) > 0.5 * door.width + IN_FRAME:
+    if abs(along) > 0.5 * door.width + WAY.in_frame_m:
         return 0
     return 1 if here > 0.0 else -1
 
@@ -130,19 +120,19 @@ def give_turns(  # noqa: C901, PLR0912 (kernel)
             hx = dx + 0.5 * door.width * door.ex
             hy = dy + 0.5 * door.width * door.ey
             swept = door.slides == 0.0 and (
-                dx * door.nx + dy * door.ny > 0.0 and hx * hx + hy * hy < SWEPT
+                dx * door.nx + dy * door.ny > 0.0 and hx * hx + hy * hy < WAY.swept_m2
             )
-            if distance < CLEAR or swept:  # nobody is hit by a leaf that moves by itself
+            if distance < DOORS.clear_m or swept:  # nobody is hit by a leaf that moves by itself
                 passage[d].inside = 1.0
-            if crowd.task[i].walking == columns.FOLLOWS and distance < ASKS:
+            if crowd.task[i].walking == columns.FOLLOWS and distance < FOLLOW.asks_m:
                 asked = True
             if side == 0:
                 continue
             across, along = dx * door.nx + dy * door.ny, dx * door.ex + dy * door.ey
-            in_frame = abs(across) < IN_FRAME and abs(along) < 0.5 * door.width
+            in_frame = abs(across) < WAY.in_frame_m and abs(along) < 0.5 * door.width
             if in_frame and (inside == 0 or side == int(passage[d].turn)):
                 inside = side
-            if side == int(passage[d].turn) and distance < KEPT:
+            if side == int(passage[d].turn) and distance < WAY.kept_m:
                 kept = True
             if distance < nearest:
                 nearest, turn = distance, side
@@ -155,7 +145,7 @@ def give_turns(  # noqa: C901, PLR0912 (kernel)
             if turn != 0 and sides[i, d] == turn:
                 dx, dy = discs[i].x - door.cx, discs[i].y - door.cy
                 # who pulls a door starts earlier, and what slides looks ahead
-                reach = PULL if turn > 0 or doors[d].slides != 0.0 else PUSH
+                reach = WAY.pull_m if turn > 0 or doors[d].slides != 0.0 else WAY.push_m
                 asked = asked or dx * dx + dy * dy < reach * reach
         passage[d].asked = 1.0 if asked else 0.0
 
@@ -166,16 +156,16 @@ def wait_beside(
 ) -> tuple[float, float]:
     """Velocity to a place on one's own side, out of the way of those who come through."""
     dx, dy = discs[i].x - door.cx, discs[i].y - door.cy
-    beside = BESIDE if dx * door.ex + dy * door.ey >= 0.0 else -BESIDE
+    beside = WAY.beside_m if dx * door.ex + dy * door.ey >= 0.0 else -WAY.beside_m
     for _ in range(2):
-        tx = door.cx + BACK * side * door.nx + beside * door.ex
-        ty = door.cy + BACK * side * door.ny + beside * door.ey
-        if clearance_at(field, tx, ty) > BODY:
+        tx = door.cx + WAY.back_m * side * door.nx + beside * door.ex
+        ty = door.cy + WAY.back_m * side * door.ny + beside * door.ey
+        if clearance_at(field, tx, ty) > WAY.body_m:
             break
         beside = -beside
     tx, ty = tx - discs[i].x, ty - discs[i].y
     gap = math.sqrt(tx * tx + ty * ty)
-    speed = min(WAIT_MPS, WAIT_GAIN * gap) / max(gap, 1e-6)
+    speed = min(WAY.wait_mps, WAY.wait_gain * gap) / max(gap, 1e-6)
     return speed * tx, speed * ty
 
 
@@ -196,18 +186,18 @@ def hold_off(
             kx, ky = discs[k].x - door.cx, discs[k].y - door.cy
             first += kx * kx + ky * ky < dx * dx + dy * dy
     if door.slides != 0.0:
-        rx, ry, stop = side * door.nx, side * door.ny, PUSH_STOP
+        rx, ry, stop = side * door.nx, side * door.ny, WAY.push_stop_m
         gap = dx * rx + dy * ry
     elif side > 0:
         rx = dx + 0.5 * door.width * door.ex
         ry = dy + 0.5 * door.width * door.ey
         gap = math.sqrt(rx * rx + ry * ry)
-        rx, ry, stop = rx / gap, ry / gap, door.width + LEAF_M
+        rx, ry, stop = rx / gap, ry / gap, door.width + WAY.leaf_m
     else:
-        rx, ry, stop = -door.nx, -door.ny, PUSH_STOP
+        rx, ry, stop = -door.nx, -door.ny, WAY.push_stop_m
         gap = dx * rx + dy * ry
-    excess = -(wanted[0] * rx + wanted[1] * ry) - HOLD_GAIN * (gap - stop - QUEUE * first)
-    excess = min(max(excess, 0.0), HOLD_MPS)
+    excess = -(wanted[0] * rx + wanted[1] * ry) - WAY.hold_gain * (gap - stop - WAY.queue_m * first)
+    excess = min(max(excess, 0.0), WAY.hold_mps)
     return wanted[0] + excess * rx, wanted[1] + excess * ry
 
 
@@ -229,12 +219,15 @@ def round_leaf(
         hy = discs[i].y - door.cy + 0.5 * width * door.ey
         off = lx * hy - ly * hx
         towards = (ly * wx - lx * wy) / speed  # to the leaf, per m, where ``off`` is positive
-        if off * towards <= 0.0 or abs(off) > abs(towards) * ROUND:
+        if off * towards <= 0.0 or abs(off) > abs(towards) * WAY.round_m:
             continue
         far = off / towards / speed
         met = (hx + far * wx) * lx + (hy + far * wy) * ly
-        if 0.0 < met < width + BODY:
-            dx, dy = (width + ROUND_END) * lx - hx, (width + ROUND_END) * ly - hy
+        if 0.0 < met < width + WAY.body_m:
+            dx, dy = (
+                (width + WAY.round_end_m) * lx - hx,
+                (width + WAY.round_end_m) * ly - hy,
+            )
             gap = max(math.sqrt(dx * dx + dy * dy), 1e-6)
             wx, wy = speed * dx / gap, speed * dy / gap
     return wx, wy

@@ -13,19 +13,17 @@ from typing import NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.actors.config import ACTORS
+from sim.actors.config import SIT, WALK
 from sim.actors.people import columns
 from sim.actors.people.following import is_pushing
 from sim.actors.people.gait import HIP, SEAT_HEIGHT
-from sim.actors.people.right_of_way import Crowd, Float, Int
+from sim.actors.people.right_of_way import Crowd, Int
 from sim.core.flow import FAR, Field, clearance_at, time_at
 from sim.core.seeds import between, uniform, waiting
 from sim.core.state import Records
 from slam._jit import inner, uncounted
+from slam.frames import Float
 
-_S = ACTORS.sitting
-SHARE, HAND, STAY, DOWN_S = _S.share, _S.hand_m, _S.stay, _S.down_s
-NEAR, ROOM, PACE, GIVE_UP_S = _S.near_m, _S.room_m, _S.pace_mps, _S.give_up_s
 PLANAR_BIT = 2  # contype of chairs, bins and the robot
 
 
@@ -62,7 +60,7 @@ def dress(crowd: Crowd, hulls: Hulls) -> None:
 def free_seat(i: int, field: Field, crowd: Crowd) -> int:
     """Row of the nearest chair at hand that nobody else has and the way to which is free; -1."""
     discs, task = crowd.discs, crowd.task
-    best, found = HAND * HAND, -1
+    best, found = SIT.hand_m * SIT.hand_m, -1
     for k in range(discs.shape[0]):
         dx, dy = discs[k].x - discs[i].x, discs[k].y - discs[i].y
         far = dx * dx + dy * dy
@@ -73,7 +71,7 @@ def free_seat(i: int, field: Field, crowd: Crowd) -> int:
         taken = False
         for other in range(len(task)):
             taken = taken or task[other].seat == k
-        open_way = clearance_at(field, discs[k].x, discs[k].y) > ROOM
+        open_way = clearance_at(field, discs[k].x, discs[k].y) > SIT.room_m
         for part in range(1, 5):
             x, y = discs[i].x + 0.2 * part * dx, discs[i].y + 0.2 * part * dy
             open_way = open_way and clearance_at(field, x, y) > 0.25
@@ -85,7 +83,7 @@ def free_seat(i: int, field: Field, crowd: Crowd) -> int:
 @inner
 def may_sit(i: int, field: Field, crowd: Crowd) -> None:
     """On arrival: perhaps go on to a chair."""
-    if crowd.state[i].luck < SHARE:
+    if crowd.state[i].luck < SIT.share:
         seat = free_seat(i, field, crowd)
         if seat >= 0:
             crowd.task[i].walking, crowd.task[i].seat = columns.TO_SEAT, seat
@@ -105,17 +103,17 @@ def sit(i: int, time: float, tick: float, crowd: Crowd) -> None:
     if task[i].walking == columns.TO_SEAT:
         slow = discs[i].u ** 2 + discs[i].v ** 2 < 0.01
         state[i].blocked += tick if slow else 0.0
-        if apart < NEAR:
+        if apart < SIT.near_m:
             task[i].walking = columns.SEATED
-            state[i].stay_until += (STAY - 1.0) * max(state[i].stay_until - time, 0.0) + 2.0
-        elif state[i].blocked > GIVE_UP_S or far > HAND + 1.0:
+            state[i].stay_until += (SIT.stay - 1.0) * max(state[i].stay_until - time, 0.0) + 2.0
+        elif state[i].blocked > SIT.give_up_s or far > SIT.hand_m + 1.0:
             task[i].walking, task[i].seat = columns.STANDS, -1
     elif task[i].walking == columns.SEATED:
         state[i].look = crowd.yaws[seat]
         if far < 0.15:
-            state[i].sit = min(state[i].sit + tick / DOWN_S, 1.0)
+            state[i].sit = min(state[i].sit + tick / SIT.down_s, 1.0)
     else:
-        state[i].sit = max(state[i].sit - tick / DOWN_S, 0.0)
+        state[i].sit = max(state[i].sit - tick / SIT.down_s, 0.0)
         if state[i].sit == 0.0 and apart > 0.03:
             task[i].seat = -1
 
@@ -133,17 +131,8 @@ def to_chair(i: int, crowd: Crowd) -> tuple[float, float]:
     discs, seat = crowd.discs, crowd.task[i].seat
     dx, dy = discs[seat].x - discs[i].x, discs[seat].y - discs[i].y
     far = math.sqrt(dx * dx + dy * dy)
-    speed = min(PACE, 3.0 * far) / max(far, 1e-6)
+    speed = min(SIT.pace_mps, 3.0 * far) / max(far, 1e-6)
     return speed * dx + 0.0, speed * dy + 0.0
-
-
-_W = ACTORS.walking
-STILL, DOORWAY = _W.still_mps, _W.doorway_m
-ARRIVE_LEAST, ARRIVE_MOST = _W.arrive_least_s, _W.arrive_most_s
-LOOK_LEAST, LOOK_MOST = _W.look_least_s, _W.look_most_s
-NEAR_S, NEAR_BLOCKED, NO_PROGRESS = _W.near_s, _W.near_blocked_s, _W.no_progress_s
-GIVES_UP, CROWD_GIVES_UP = _W.blocked_s, _W.crowd_blocked_s
-PATIENT, CROWD_PATIENT = _W.patient_s, _W.crowd_patient_s
 
 
 @inner
@@ -153,7 +142,7 @@ def new_trip(i: int, time: float, stay: float, field: Field, crowd: Crowd) -> No
     n_goals = field.times.shape[0]
     offset = 1 + int(uniform(draws, i) * (n_goals - 1))
     goal = task[i].goal
-    state[i].arrive = between(draws, i, ARRIVE_LEAST, ARRIVE_MOST)
+    state[i].arrive = between(draws, i, WALK.arrive_least_s, WALK.arrive_most_s)
     wait = waiting(draws, i, 1.0 / stay)
     state[i].stay_until = wait * state[i].stays  # a duration until the arrival
     state[i].look = between(draws, i, -math.pi, math.pi)
@@ -190,9 +179,9 @@ def arrived(i: int, left: float, doors: Records, discs: Records, state: Records)
     """Near enough to the goal, or held up close to it, and not standing in a doorway."""
     for d in range(doors.shape[0]):
         dx, dy = discs[i].x - doors[d].cx, discs[i].y - doors[d].cy
-        if dx * dx + dy * dy < DOORWAY * DOORWAY:
+        if dx * dx + dy * dy < WALK.doorway_m * WALK.doorway_m:
             return False
-    return left < state[i].arrive or (left < NEAR_S and state[i].blocked > NEAR_BLOCKED)
+    return left < state[i].arrive or (left < WALK.near_s and state[i].blocked > WALK.near_blocked_s)
 
 
 @inner
@@ -210,15 +199,15 @@ def plan(  # noqa: C901, PLR0913 (kernel)
             new_trip(i, time, stay, field, crowd)
         elif task[i].walking == columns.STANDS and time >= state[i].look_until:
             state[i].look = between(draws, look, -math.pi, math.pi)
-            state[i].look_until = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
+            state[i].look_until = time + between(draws, look, WALK.look_least_s, WALK.look_most_s)
         return
     if state[i].sit > 0.0:  # getting up
         state[i].best_at = time
         return
     left = way_left(i, field, crowd)
-    gives_up = CROWD_GIVES_UP if state[i].dense < 1.0 else GIVES_UP
+    gives_up = WALK.crowd_blocked_s if state[i].dense < 1.0 else WALK.blocked_s
     state[i].walked_s += tick
-    if discs[i].u ** 2 + discs[i].v ** 2 < STILL * STILL:
+    if discs[i].u ** 2 + discs[i].v ** 2 < WALK.still_mps * WALK.still_mps:
         state[i].blocked += tick
         state[i].blocked_s += tick
     else:
@@ -228,10 +217,10 @@ def plan(  # noqa: C901, PLR0913 (kernel)
     if arrived(i, left, doors, discs, state):
         task[i].walking = columns.STANDS
         state[i].stay_until += time
-        state[i].look_until = time + between(draws, look, LOOK_LEAST, LOOK_MOST)
+        state[i].look_until = time + between(draws, look, WALK.look_least_s, WALK.look_most_s)
         if task[i].seat < 0 and task[i].hand < 0 and task[i].held < 0:
             may_sit(i, field, crowd)
-    elif state[i].blocked > gives_up or time - state[i].best_at > NO_PROGRESS:
+    elif state[i].blocked > gives_up or time - state[i].best_at > WALK.no_progress_s:
         new_trip(i, time, stay, field, crowd)
 
 
@@ -242,7 +231,7 @@ def patience(i: int, time: float, crowd: Crowd) -> float:
     It wears out after 0.8 to 1.6 s of standing, or 2 to 4 s of walking about without progress; in a
     crowd after 0.3 to 0.6 s of standing.
     """
-    patient = CROWD_PATIENT if crowd.state[i].dense < 1.0 else PATIENT
+    patient = WALK.crowd_patient_s if crowd.state[i].dense < 1.0 else WALK.patient_s
     stood = (crowd.state[i].blocked - patient) / patient
     lost = (
         (time - crowd.state[i].best_at - 2.0) / 2.0

@@ -17,8 +17,8 @@ from scenes.footprint import at_rest
 from sim.sensors.lidar import columns as col
 from slam._jit import inner, njit
 from slam.errors import InvalidValueError
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Bool = NDArray[np.bool_]
 
 HULL_GROUP = 3  # collision hulls: never seen by rays or cameras

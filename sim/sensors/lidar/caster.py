@@ -14,8 +14,8 @@ from sim.sensors.lidar import columns as col
 from sim.sensors.lidar import raycast, windows
 from sim.sensors.lidar.candidates import candidates
 from sim.sensors.lidar.scanner import Spot
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Hits = tuple[Float, NDArray[np.int64], Float]
 # (m, 12) poses of what can move; (3,) x, y, yaw of the laser; (bodies, 7) the bodies' places, NaN
 # for those that moved or are not known.

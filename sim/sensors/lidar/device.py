@@ -23,8 +23,8 @@ from sim.sensors.lidar.schedule import Window, most_notes, schedule
 from sim.sensors.lidar.surfaces import geom_reflectivity, glass_geoms, polished_geoms
 from slam import se2
 from slam.errors import InvalidValueError
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 STEPS_PER_S = 300  # physics steps between which poses are noted
 
 __all__ = ["LaserScanner", "ScanResult"]

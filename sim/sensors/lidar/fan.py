@@ -13,8 +13,8 @@ from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
 from slam._jit import inner
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Vec3 = tuple[float, float, float]
 

@@ -11,10 +11,11 @@ import numpy as np
 from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
-from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, lay_fans, ray_wedge, row_of
+from sim.sensors.lidar.fan import SLACK, Int, Vec3, lay_fans, ray_wedge, row_of
 from sim.sensors.lidar.ray_shapes import Pose, face_normal, meet
 from sim.sensors.lidar.windows import enclose, find_windows, nearest_first
 from slam._jit import inner, uncounted
+from slam.frames import Float
 
 Ray = tuple[Vec3, Vec3]
 AWAY = 1e-6  # m from a mirror at which what it shows begins, so that it does not show itself

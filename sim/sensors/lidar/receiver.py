@@ -12,15 +12,9 @@ from numpy.typing import NDArray
 from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.caster import Hits
 from sim.sensors.lidar.scanner import Band, Scanner, error_at
-from sim.sensors.lidar.signal import (
-    ERROR_STEP,
-    NEEDED_STEP,
-    Bool,
-    Float,
-    Int,
-    scan,
-)
+from sim.sensors.lidar.signal import ERROR_STEP, NEEDED_STEP, Bool, Int, scan
 from slam._jit import njit
+from slam.frames import Float
 
 Curve = tuple[tuple[float, float], ...]
 

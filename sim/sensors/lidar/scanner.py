@@ -17,10 +17,8 @@ from numpy.typing import NDArray
 
 from sim.sensors.lidar import columns as col
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, LaserSpec
+from slam.frames import NS_PER_S, Float, LaserSpec
 from slam.shaped import Share, check, one_of
-
-Float = NDArray[np.float64]
 
 ERRORS = ("full", "noise", "ideal")  # every error that is known; the statistical one alone; none
 RATE_HZ = (1.0, 300.0)  # of scans; a scan lasts a physics step of 1/300 s or longer

@@ -20,8 +20,8 @@ from numpy.typing import NDArray
 from sim.sensors.lidar import columns as col
 from sim.sensors.lidar.fan import row_of
 from slam._jit import inner, njit
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Int = NDArray[np.int64]
 Bool = NDArray[np.bool_]
 

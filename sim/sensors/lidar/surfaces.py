@@ -9,7 +9,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-Float = NDArray[np.float64]
+from slam.frames import Float
 
 # Material name, or how it begins -> reflectivity at 905 nm. TD p7 lists black cardboard 10 %, grey
 # cardboard 20, raw pine 40, grey PVC 50, white paper 80, metals 110 and more, black rubber 2; what

@@ -11,8 +11,9 @@ import math
 from typing import Any, NamedTuple
 
 from sim.sensors.lidar import columns as col
-from sim.sensors.lidar.fan import SLACK, Float, Int, Vec3, row_of
+from sim.sensors.lidar.fan import SLACK, Int, Vec3, row_of
 from slam._jit import inner, uncounted
+from slam.frames import Float
 
 BUCKETS = 64
 

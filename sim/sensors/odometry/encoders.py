@@ -27,10 +27,8 @@ from sim.sensors.odometry.config import PRESETS, OdometryConfig, preset
 from sim.sensors.odometry.motion import COUNTED, NOW, over_scan, update
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.frames import Odometry
+from slam.frames import Float, Odometry
 from slam.shaped import instance
-
-Float = NDArray[np.float64]
 
 __all__ = ["PRESETS", "OdometryConfig", "WheelOdometry", "preset"]
 

@@ -14,13 +14,12 @@ from itertools import pairwise
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy.optimize import nnls
 
 from slam import se2
 from slam.errors import InvalidValueError
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 LEAST = 10  # increments, to fit anything
 WINDOW = 16  # increments of the windows that tell slopes: 6 to 17 m of the logs' ways
 LONGEST = 0.25  # of the increments are in the longest window that tells variances

@@ -4,11 +4,10 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
+from slam.frames import Float
 
-Float = NDArray[np.float64]
 Vec3 = tuple[float, float, float]
 
 # What tyres creep in one scan while the encoders stand still, and what keeps a covariance

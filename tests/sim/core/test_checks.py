@@ -27,6 +27,7 @@ from slam.errors import InvalidValueError
         (Lms221Config, "fov_deg", 180.5),
         (RangeEffects, "glass", 1),
         (RangeEffects, "dropout_rate", None),
+        (RangeEffects, "dropout_rate", 1.5),
         (Dynamism, "door_rate", "often"),
         (Dynamism, "moving_share", True),
         (OdometryConfig, "scale_std", "0.1"),

@@ -6,7 +6,8 @@ import math
 import numpy as np
 import pytest
 
-from sim.actors.people.avoidance import HORIZON, impact_time
+from sim.actors.config import STEER
+from sim.actors.people.avoidance import impact_time
 from sim.core.flow import FAR, FlowMap, box_clearance, clearance_at, time_at, way_at
 
 BOUNDS = (0.0, 0.0, 10.0, 6.0)
@@ -81,7 +82,7 @@ def test_ways_go_around_a_leaf_that_stands_open():
 
 def test_impact_time_of_discs():
     assert impact_time(3.0, 0.0, 2.0, 0.0, 1.0) == pytest.approx(1.0)
-    assert impact_time(3.0, 0.0, -2.0, 0.0, 1.0) == HORIZON
-    assert impact_time(3.0, 1.01, 2.0, 0.0, 1.0) == HORIZON
+    assert impact_time(3.0, 0.0, -2.0, 0.0, 1.0) == STEER.horizon_s
+    assert impact_time(3.0, 1.01, 2.0, 0.0, 1.0) == STEER.horizon_s
     assert impact_time(0.5, 0.0, 1.0, 0.0, 1.0) == 0.0
-    assert impact_time(0.5, 0.0, -1.0, 0.0, 1.0) == HORIZON
+    assert impact_time(0.5, 0.0, -1.0, 0.0, 1.0) == STEER.horizon_s

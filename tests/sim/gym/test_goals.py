@@ -91,7 +91,7 @@ def test_a_goal_that_cannot_be_reached_is_refused_with_one_that_can(scene):
     env = MobiliaEnv(scene)
     _, info = env.reset(seed=0)
     wall = env.simulation.world.scene.obstacles[0]
-    for goal in (tuple(wall[:2]), (500.0, 0.0)):
+    for goal in (tuple(wall[:2]), (500.0, 0.0), (-8.0, -1.0)):
         with pytest.raises(InvalidValueError, match="does not lie on free floor") as caught:
             env.reset(seed=0, options={"goal": goal})
         nearest = re.search(r"nearest is \((.*), (.*)\)", str(caught.value))

@@ -17,7 +17,7 @@ from sim.gym import env as environment
 from sim.gym.env import MobiliaEnv
 from sim.gym.vector import MobiliaVectorEnv
 from sim.gym.workers import RoomsEndedError
-from slam.errors import InvalidValueError, MobiliaError
+from slam.errors import InvalidValueError
 
 pytestmark = pytest.mark.slow
 SHORT = {"scene": "arena", "time_limit_s": 0.15, "goal": "random"}
@@ -157,14 +157,6 @@ def runs(pid: int) -> bool:
         return "Z" not in Path(f"/proc/{pid}/stat").read_text().rpartition(")")[2].split()[0]
     except OSError:
         return False
-
-
-def test_what_cannot_be_sent_is_refused():
-    class Own(type(MobiliaEnv(**SHORT)._settings["laser"])):
-        pass
-
-    with pytest.raises(MobiliaError, match="another process"):
-        MobiliaVectorEnv(2, n_workers=2, scene="arena", laser=Own())
 
 
 def test_what_a_worker_cannot_load_is_refused_and_the_rooms_go_on(rooms, monkeypatch):

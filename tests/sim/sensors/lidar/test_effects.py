@@ -13,7 +13,6 @@ from sim.sensors.lidar.models.lms221 import Lms221Config, RangeEffects
 from sim.sensors.lidar.receiver import error_function
 from sim.sensors.lidar.scanner import Band
 from sim.sensors.lidar.surfaces import reflectivity_of
-from slam.errors import InvalidValueError
 
 NONE = RangeEffects.none()
 MATERIALS = "".join(
@@ -213,8 +212,3 @@ def test_reflectivity_goes_by_the_longest_known_beginning(material: str, value: 
     assert reflectivity_of(material) == value
     assert reflectivity_of("chair3/" + material) == value
     assert reflectivity_of("unobtainium") == 0.5
-
-
-def test_an_impossible_rate_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match=r"RangeEffects\.dropout_rate"):
-        RangeEffects(dropout_rate=1.5)

@@ -27,24 +27,18 @@ def scan(
     return lidar.observe(room.stepper(model, data, twist), data), lidar
 
 
-def test_half_degree_beams_come_from_the_second_turn() -> None:
-    offsets = Lms221Config(resolution_deg=0.5).spec().beam_time_offsets
-    whole, half = offsets[0::2], offsets[1::2]
-    np.testing.assert_allclose(whole, np.arange(181) / 360 * TURN, atol=1e-9)
-    np.testing.assert_allclose(half, TURN + (np.arange(180) + 0.5) / 360 * TURN, atol=1e-9)
-    per_degree = np.diff(whole)
-    np.testing.assert_allclose(per_degree, 37.0e-6, atol=0.1e-6)
-
-
-def test_quarter_degree_scans_are_four_turns_of_181_and_three_times_180_beams() -> None:
-    config = Lms221Config(resolution_deg=0.25)
-    turn = config.scanner().turn_of
-    degrees = 0.25 * np.arange(721)
-    assert np.bincount(turn).tolist() == [181, 180, 180, 180]
-    for k, start in enumerate((0.0, 0.25, 0.5, 0.75)):
-        np.testing.assert_allclose(degrees[turn == k][0], start)
+@pytest.mark.parametrize(
+    ("resolution", "beams"), [(1.0, [181]), (0.5, [181, 180]), (0.25, [181, 180, 180, 180])]
+)
+def test_a_scan_interlaces_turns_of_whole_degrees(resolution: float, beams: list[int]) -> None:
+    config = Lms221Config(resolution_deg=resolution)
+    turn, degrees = config.scanner().turn_of, resolution * np.arange(sum(beams))
+    assert np.bincount(turn).tolist() == beams
+    for k in range(len(beams)):
+        np.testing.assert_allclose(degrees[turn == k], k * resolution + np.arange(beams[k]))
     times = config.spec().beam_time_offsets
     np.testing.assert_allclose(times, (turn + degrees / 360.0) * TURN, atol=1e-9)
+    assert np.diff(times[turn == 0]) == pytest.approx(37.0e-6, abs=0.1e-6)
 
 
 def test_the_stamp_of_a_100_degree_scan_is_40_degrees_of_mirror_after_the_turn_begins() -> None:
