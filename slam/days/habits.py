@@ -22,10 +22,10 @@ from itertools import product
 
 import numpy as np
 
+from slam.arrays import Float
 from slam.days.history import History, dense, hour_of
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
-from slam.frames import Float
 
 HOUR_S = 3600.0
 LEAST = 0.01  # no probability is nearer to 0 or 1; set by hand

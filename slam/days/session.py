@@ -14,13 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from slam import se2
+from slam.arrays import Float
 from slam.days.evidence import CELL_M, EVERY_S, SessionGrid
 from slam.days.habits import DaysRaster, MobilityMap
 from slam.days.history import NAMES, History, News
 from slam.days.search import FITS, KNOWN, SPOILS, Agreement, Past, StartSearch
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Changes, Estimate, Raster
-from slam.frames import Float, Frame, to_s
+from slam.frames import Frame, to_s
 from slam.path import PosePath
 from slam.tracker import map_file
 from slam.tracker.belief.places import coarse
@@ -62,12 +63,7 @@ class Session:
     cells_hold = "activities"
 
     def __init__(
-        self,
-        tracker: Tracker,
-        *,
-        time_s: float,
-        history: History | None = None,
-        found: bool = True,
+        self, tracker: Tracker, *, time_s: float, history: History | None = None, found: bool = True
     ) -> None:
         if not math.isfinite(time_s):
             raise InvalidValueError(f"Session.time_s must be finite, got {time_s}")

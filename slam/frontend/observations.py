@@ -10,11 +10,11 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
+from slam.arrays import Bools, Bytes, Float, Float32, Ints
 from slam.errors import InvalidValueError
-from slam.frames import Features, Float, Frame, Scan
+from slam.frames import Features, Frame, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import NEAR_CELLS, face, follow_ends, join, unmixed
@@ -77,8 +77,8 @@ class Observations:
     covariances: Float
     weights: Float
     tangents: Float
-    joined: NDArray[np.bool_]
-    facings: NDArray[np.uint8]
+    joined: Bools
+    facings: Bytes
     view: View
     T_robot_laser: Float
     sensor_sigma_m: float = FRONTEND.sensor_sigma_m
@@ -111,16 +111,16 @@ class Observations:
 
 @inner
 def _scanned(  # noqa: PLR0913 (kernel)
-    ranges: NDArray[np.float32],
-    angles: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    twist: NDArray[np.float64],
+    ranges: Float32,
+    angles: Float,
+    offsets: Float,
+    T_robot_laser: Float,
+    twist: Float,
     limits: tuple[float, float, float, float],
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    bearings: NDArray[np.float64],
-    free: NDArray[np.float64],
+    points: Float,
+    beams: Ints,
+    bearings: Float,
+    free: Float,
 ) -> tuple[int, bool]:
     """End points in the robot frame of the stamp; bearings and free ranges about that laser.
 
@@ -157,12 +157,7 @@ def _scanned(  # noqa: PLR0913 (kernel)
 
 @inner
 def _cleared(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    origin: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    tangents: NDArray[np.float64],
-    clear: NDArray[np.uint8],
+    points: Float, beams: Ints, origin: Float, joined: Bools, tangents: Float, clear: Bytes
 ) -> int:
     """Move the hits that are no mixed pixel to the front; how many there are. ``clear``: room."""
     count = unmixed(points, beams, origin, joined, clear)
@@ -178,17 +173,17 @@ def _cleared(
 
 @inner
 def _surveyed(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    origin: NDArray[np.float64],
+    points: Float,
+    beams: Ints,
+    origin: Float,
     near: float,
     sweep: tuple[float, int, float],
     variance: float,
-    joined: NDArray[np.bool_],
-    tangents: NDArray[np.float64],
-    facings: NDArray[np.uint8],
-    covariances: NDArray[np.float64],
-    weights: NDArray[np.float64],
+    joined: Bools,
+    tangents: Float,
+    facings: Bytes,
+    covariances: Float,
+    weights: Float,
 ) -> int:
     """Surfaces through the hits; those that remain are moved to the front, and their number.
 
@@ -207,9 +202,7 @@ def _surveyed(  # noqa: PLR0913 (kernel)
 
 
 @inner
-def _order(
-    bearings: NDArray[np.float64], order: NDArray[np.int64], room: NDArray[np.int64]
-) -> None:
+def _order(bearings: Float, order: Ints, room: Ints) -> None:
     """Fill ``order`` with the beams by rising bearing, equal ones by number: a merge sort, which
     copies what is in order already, as most of a scan is."""
     n, width = len(order), 1
@@ -235,12 +228,12 @@ def _order(
 
 @inner
 def _by_bearing(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    bearings: NDArray[np.float64],
-    order: NDArray[np.int64],
-    place: NDArray[np.int64],
-    room: NDArray[np.float64],
+    points: Float,
+    beams: Ints,
+    bearings: Float,
+    order: Ints,
+    place: Ints,
+    room: Float,
 ) -> None:
     """Of an interlaced scanner that turns: neighbours are those by bearing, not by number.
 
@@ -261,25 +254,25 @@ def _by_bearing(
 
 @uncounted
 def _observed(  # noqa: PLR0913 (kernel)
-    ranges: NDArray[np.float32],
-    angles: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    twist: NDArray[np.float64],
+    ranges: Float32,
+    angles: Float,
+    offsets: Float,
+    T_robot_laser: Float,
+    twist: Float,
     limits: tuple[float, float, float, float],
     sweep: tuple[float, int, float],
     near: float,
     variance: float,
     interlaced: bool,
-    points: NDArray[np.float64],
-    tangents: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    facings: NDArray[np.uint8],
-    bins: NDArray[np.float64],
-    room: NDArray[np.float64],
-    beams: NDArray[np.int64],
+    points: Float,
+    tangents: Float,
+    covariances: Float,
+    weights: Float,
+    joined: Bools,
+    facings: Bytes,
+    bins: Float,
+    room: Float,
+    beams: Ints,
 ) -> tuple[int, float]:
     """All that one scan shows: how many points there are, and the longest free range.
 

@@ -10,8 +10,9 @@ import numpy as np
 
 from slam import se2
 from slam._jit import inner, uncounted
+from slam.arrays import Float
 from slam.errors import InvalidValueError
-from slam.frames import MOST_TWIST, Float, Odometry
+from slam.frames import MOST_TWIST, Odometry
 from slam.frontend.heading_bias import HeadingBias
 from slam.frontend.motions import chained
 

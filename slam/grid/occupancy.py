@@ -11,11 +11,10 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import njit
+from slam.arrays import Float, Float32, Int32
 from slam.estimate import Raster
-from slam.frames import Float
 from slam.frontend.visibility import View, free_around, seen_empty
 from slam.settings import Settings, number
 from slam.tracker.cell_map import CellMap
@@ -71,7 +70,7 @@ class Odds(NamedTuple):
 
 
 @njit
-def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float) -> bool:
+def _open(cells: Cells, view: View, T_map_laser: Float, cell: float) -> bool:
     """Let every block in view live: a grid also remembers where it saw nothing. False: no room."""
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
@@ -102,7 +101,7 @@ def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: floa
 
 @njit
 def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
-    cells: Cells, log_odds: NDArray[np.float32], view: View, T_map_laser: NDArray[np.float64],
+    cells: Cells, log_odds: Float32, view: View, T_map_laser: Float,
     cell: float, step: float, odds: Odds, known_s: float, off: int, write: bool,
 ) -> Look:  # fmt: skip
     """Add one scan, ``step`` s after the last, to ``log_odds`` (S, 8, 8) by slot.
@@ -162,9 +161,7 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
 
 
 @njit
-def _probabilities(
-    cells: Cells, log_odds: NDArray[np.float32], i0: int, j0: int, n: int, out: NDArray[np.float32]
-) -> None:
+def _probabilities(cells: Cells, log_odds: Float32, i0: int, j0: int, n: int, out: Float32) -> None:
     """Into ``out``, NaN so far, from cell (i0, j0) on, ``n`` a side as one: the largest of them."""
     rows, columns = cells.directory.shape
     for row in range(rows):
@@ -215,11 +212,11 @@ class Grid(CellMap):
         more = len(self.cells.age) - len(self.log_odds)
         self.log_odds = np.concatenate([self.log_odds, np.zeros((more, SIDE, SIDE), np.float32)])
 
-    def kept(self, slots: NDArray[np.int32]) -> NDArray[np.float32]:
+    def kept(self, slots: Int32) -> Float32:
         """Log-odds, which a file has in the place of ages."""
         return self.log_odds[slots]
 
-    def restore(self, slot: int, kept: NDArray[np.float32]) -> None:
+    def restore(self, slot: int, kept: Float32) -> None:
         """Log-odds of a file, and the least time of looking that they took."""
         self.log_odds[slot] = kept
         looks = np.where(kept > 0.0, kept / self._odds.hit, kept / min(self._odds.miss, -1e-3))

@@ -11,9 +11,9 @@ import math
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import uncounted
+from slam.arrays import Float, Float32, Int32
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frontend.visibility import View
@@ -116,11 +116,11 @@ class CellMap(abc.ABC):
         """Forget the present impressions, and the blocks that were born under them in vain."""
         _release(tuple(self.cells))
 
-    def kept(self, slots: NDArray[np.int32]) -> NDArray[np.float32]:
+    def kept(self, slots: Int32) -> Float32:
         """(n, 8, 8) what a file keeps as ``age``."""
         return self.cells.age[slots]
 
-    def restore(self, slot: int, kept: NDArray[np.float32]) -> None:
+    def restore(self, slot: int, kept: Float32) -> None:
         """Let a block of a file have what ``kept`` gave."""
         self.cells.age[slot] = kept
 
@@ -128,16 +128,14 @@ class CellMap(abc.ABC):
     def integrate(
         self,
         view: View,
-        T_map_laser: NDArray[np.float64],
+        T_map_laser: Float,
         step: float,
         *,
         write: bool,
     ) -> Look:
         """Take the present impressions in for ``step`` s; ``write`` False only looks."""
 
-    def window(
-        self, xmin: float, ymin: float, xmax: float, ymax: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def window(self, xmin: float, ymin: float, xmax: float, ymax: float) -> tuple[Float32, Float32]:
         """Dense short-term x and long-term y of the cells whose centres lie in the rectangle (m).
 
         Row 0 is the lowest y. Both are 0 where nothing lives.
@@ -167,9 +165,7 @@ class CellMap(abc.ABC):
             n += 1
         return n
 
-    def raster(
-        self, values: NDArray[np.float32], extent: tuple[int, int, int, int], n: int = 1
-    ) -> Raster:
+    def raster(self, values: Float32, extent: tuple[int, int, int, int], n: int = 1) -> Raster:
         """``values`` of the cells of ``extent``, ``n`` a side as one."""
         origin = np.array([extent[0] * self.cell, extent[1] * self.cell, 0.0])
         return Raster(values=values, resolution_m=n * self.cell, T_map_origin=origin)

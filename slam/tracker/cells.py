@@ -12,6 +12,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam._jit import inner
+from slam.arrays import Bytes, Float, Float32, Int32, Ints
 from slam.frontend.surfaces import FACES
 from slam.frontend.visibility import View
 
@@ -42,19 +43,19 @@ class Cells(NamedTuple):
     counts      (2,) int64: unused slots, touched blocks
     """
 
-    directory: NDArray[np.int32]
-    corner: NDArray[np.int64]
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
-    age: NDArray[np.float32]
-    facing: NDArray[np.uint8]
-    off: NDArray[np.uint8]
-    free: NDArray[np.int32]
-    scratch_of: NDArray[np.int32]
-    impression: NDArray[np.float32]
-    faced: NDArray[np.uint8]
-    touched: NDArray[np.int32]
-    counts: NDArray[np.int64]
+    directory: Int32
+    corner: Ints
+    x: Float32
+    y: Float32
+    age: Float32
+    facing: Bytes
+    off: Bytes
+    free: Int32
+    scratch_of: Int32
+    impression: Float32
+    faced: Bytes
+    touched: Int32
+    counts: Ints
 
 
 @inner
@@ -170,7 +171,7 @@ def _longer(array: NDArray[Any], more: int, fill: float) -> NDArray[Any]:
     return longer
 
 
-def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+def living(cells: Cells) -> tuple[Int32, Ints]:
     """Slots (n,) of the living blocks and their block indices (n, 2: x, y), by rows."""
     rows, columns = np.nonzero(cells.directory >= 0)
     return cells.directory[rows, columns], np.stack([columns, rows], axis=1) + cells.corner
@@ -178,7 +179,7 @@ def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
 
 @inner
 def in_reach(
-    cells: Cells, view: View, T_map_laser: NDArray[np.float64], size: float
+    cells: Cells, view: View, T_map_laser: Float, size: float
 ) -> tuple[int, int, int, int]:
     """Directory rows and columns (first, past the last, each) of the blocks that are touched, or
     not hidden from the view: their centres are at most half a block beyond a free range, and that

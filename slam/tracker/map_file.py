@@ -24,10 +24,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.archives import read_arrays, write_arrays
+from slam.arrays import Float
 from slam.checked import covariance, is_number, pose
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing
-from slam.frames import Float
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import FREE_COUNT, MOST_OFF, SIDE, living
 from slam.tracker.config import TrackerConfig

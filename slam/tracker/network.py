@@ -10,9 +10,9 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
+from slam.arrays import Float
 from slam.frontend.surfaces import opposite
 from slam.frontend.visibility import View, free_around, seen_empty
 from slam.tracker.cell_map import CellMap
@@ -86,7 +86,7 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
 def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
     arrays: tuple[Any, ...],
     plain_view: tuple[Any, ...],
-    T_map_laser: NDArray[np.float64],
+    T_map_laser: Float,
     cell: float,
     numbers: tuple[Any, ...],
     write: bool,
@@ -196,14 +196,7 @@ class Network(CellMap):
         reach = config.lateral_reach_cells
         self.mu = lateral_mu(config.lateral_sum, reach) if lateral else 0.0
 
-    def integrate(
-        self,
-        view: View,
-        T_map_laser: NDArray[np.float64],
-        step: float,
-        *,
-        write: bool,
-    ) -> Look:
+    def integrate(self, view: View, T_map_laser: Float, step: float, *, write: bool) -> Look:
         """Take the present impressions in for ``step`` s; see the kernel of the same name."""
         numbers, pace = self.config.map, self.pace(step)
         law = (

@@ -11,11 +11,10 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
 from slam._jit import inlined, inner, uncounted
-from slam.frames import Float
+from slam.arrays import Bools, Bytes, Float, Float32
 from slam.frontend.observations import Observations
 from slam.frontend.surfaces import turned_face
 from slam.tracker.cell_map import CellMap
@@ -26,7 +25,7 @@ FINE = MapConfig().bell_steps
 
 
 @functools.cache
-def _bell(ends: float) -> NDArray[np.float32]:
+def _bell(ends: float) -> Float32:
     """I by the squared Mahalanobis distance, ``FINE`` entries for each unit of it."""
     entries = range(int(ends * FINE))
     return np.array([math.exp(-0.5 * k / FINE) for k in entries] + [0.0], np.float32)
@@ -74,7 +73,7 @@ def _rasterise_point(  # noqa: PLR0913 (kernel)
     cov: tuple[float, float, float],
     faced: int,
     ends: float,
-    bell: NDArray[np.float32],
+    bell: Float32,
 ) -> bool:
     """Gaussian with covariance ``cov`` (xx, xy, yy) about (u, v), in cells."""
     a, b, d = cov
@@ -124,7 +123,7 @@ def _rasterise_stretch(  # noqa: PLR0913 (kernel)
     variance: float,
     faced: int,
     ends: float,
-    bell: NDArray[np.float32],
+    bell: Float32,
 ) -> bool:
     """Gaussian ridge about the stretch from (u, v) to (u + du, v + dv), in cells."""
     square = du * du + dv * dv
@@ -160,12 +159,7 @@ def _rasterise_stretch(  # noqa: PLR0913 (kernel)
 
 @inner
 def _moved(
-    points_robot: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    pose: NDArray[np.float64],
-    cell: float,
-    points: NDArray[np.float64],
-    box: NDArray[np.float64],
+    points_robot: Float, covariances: Float, pose: Float, cell: float, points: Float, box: Float
 ) -> None:
     """``points`` in the map frame, and the ``box`` (xmin, ymin, xmax, ymax) of their Gaussians."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -185,7 +179,7 @@ def _moved(
 
 
 @inner
-def _is_covered(cells: Cells, box: NDArray[np.float64], size: float) -> bool:
+def _is_covered(cells: Cells, box: Float, size: float) -> bool:
     """Whether the directory has the blocks, ``size`` m wide, of the box and those around it."""
     rows, columns = cells.directory.shape
     cx, cy = cells.corner[0], cells.corner[1]
@@ -197,17 +191,17 @@ def _is_covered(cells: Cells, box: NDArray[np.float64], size: float) -> bool:
 @uncounted
 def _stamp(  # noqa: PLR0913 (kernel)
     arrays: tuple[Any, ...],
-    points_robot: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    facings: NDArray[np.uint8],
-    pose: NDArray[np.float64],
+    points_robot: Float,
+    covariances: Float,
+    joined: Bools,
+    facings: Bytes,
+    pose: Float,
     cell: float,
     ends: float,
-    bell: NDArray[np.float32],
+    bell: Float32,
     start: int,
-    points: NDArray[np.float64],
-    box: NDArray[np.float64],
+    points: Float,
+    box: Float,
 ) -> int:
     """Raise I around the points, seen from ``pose``, from ``start`` on; ``arrays`` of ``Cells``.
 

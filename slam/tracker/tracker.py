@@ -12,9 +12,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
+from slam.arrays import Float, Float32
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Estimate
-from slam.frames import Float, Frame, Odometry
+from slam.frames import Frame, Odometry
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction, turned
 from slam.path import PosePath
@@ -293,9 +294,7 @@ class Tracker(abc.ABC):
         self._T_map_robot = self._T_map_robot + by
         self._T_map_robot[2] = se2.wrap(float(self._T_map_robot[2]))
 
-    def window(
-        self, xmin: float, ymin: float, xmax: float, ymax: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def window(self, xmin: float, ymin: float, xmax: float, ymax: float) -> tuple[Float32, Float32]:
         """Dense short-term x and long-term y of the cells centred in the rectangle (map, m)."""
         return self.cell_map.window(xmin, ymin, xmax, ymax)
 

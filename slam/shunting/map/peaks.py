@@ -5,10 +5,9 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frames import Float
+from slam.arrays import Float
 from slam.tracker.cells import MASK, SHIFT, SIDE, Cells
 from slam.tracker.network import Network
 
@@ -37,7 +36,7 @@ def _age(cells: Cells, i: int, j: int) -> float:
 
 
 @inner
-def _spread(near: NDArray[np.float64], own: float, out: NDArray[np.float64]) -> None:
+def _spread(near: Float, own: float, out: Float) -> None:
     """Covariance xx, xy, yy (cells^2) of a bell beyond the lattice's ``own`` width, into ``out``.
 
     ``near`` (3, 3) are the logarithms of the neuron and its neighbours: their second differences
@@ -84,10 +83,10 @@ def _peaks(  # noqa: PLR0913 (kernel)
     cell: float,
     short: float,
     least: float,
-    centre: NDArray[np.float64],
+    centre: Float,
     reach: float,
     own: float,
-    out: NDArray[np.float64],
+    out: Float,
 ) -> int:
     """Fill ``out`` (most, 7) with x, y, height, spread xx, xy, yy and age; how many there are."""
     count = 0

@@ -14,7 +14,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.belief.doubt import Doubt

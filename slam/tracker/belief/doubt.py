@@ -9,7 +9,7 @@ the map. If the robot turns out to be where its motion led, the copy is the map 
 import math
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.observations import Observations
 from slam.tracker.belief.places import Places
 from slam.tracker.cell_map import CellMap

@@ -6,10 +6,8 @@ it, from where blurred observations lead and with a weight that falls with the m
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from slam._jit import inner, uncounted
+from slam.arrays import Bytes, Float, Float32, Int32, Ints
 from slam.frontend.odometry_prior import inverse, turn
 from slam.tracker.matching.score import Field, Reward, Seen, evaluated
 
@@ -30,12 +28,7 @@ class Climb(NamedTuple):
 
 
 @inner
-def _prior(
-    pose: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    precision: NDArray[np.float64],
-    slope: NDArray[np.float64],
-) -> float:
+def _prior(pose: Float, prediction: Float, precision: Float, slope: Float) -> float:
     """-1/2 e' P^-1 e with e = pose - prediction (heading wrapped); its gradient in ``slope``."""
     ex, ey = pose[0] - prediction[0], pose[1] - prediction[1]
     et = pose[2] - prediction[2]
@@ -46,9 +39,7 @@ def _prior(
 
 
 @inner
-def _solve(
-    H: NDArray[np.float64], g: NDArray[np.float64], damping: float, step: NDArray[np.float64]
-) -> None:
+def _solve(H: Float, g: Float, damping: float, step: Float) -> None:
     """(H + damping diag H) step = g for a positive definite 3 x 3 H, by Cholesky."""
     grow = 1.0 + damping
     l00 = math.sqrt(H[0, 0] * grow)
@@ -70,12 +61,12 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     reward: Reward,
     climb: Climb,
     seen: Seen,
-    pose: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    precision: NDArray[np.float64],
+    pose: Float,
+    prediction: Float,
+    precision: Float,
     tau: float,
-    information: NDArray[np.float64],
-    scratch: NDArray[np.float64],
+    information: Float,
+    scratch: Float,
 ) -> tuple[float, float, float, float]:
     """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
 
@@ -139,9 +130,7 @@ class Widths(NamedTuple):
 
 
 @inner
-def blur(
-    seen: Seen, covariance: NDArray[np.float64], widths: Widths, every: int, out: Seen
-) -> bool:
+def blur(seen: Seen, covariance: Float, widths: Widths, every: int, out: Seen) -> bool:
     """Fill ``out`` with one of ``every`` so many, smeared by a pose's (3, 3) ``covariance``.
 
     That one is in the robot frame. False, and ``out`` is not to be used, where it smears none of
@@ -204,26 +193,26 @@ def _numbers(plain: tuple[Any, ...]) -> tuple[Reward, Climb]:
 
 @uncounted
 def climbed(  # noqa: PLR0913 (kernel)
-    directory: NDArray[np.int32],
-    corner: NDArray[np.int64],
-    x: NDArray[np.float32],
-    y: NDArray[np.float32],
-    facing: NDArray[np.uint8],
+    directory: Int32,
+    corner: Ints,
+    x: Float32,
+    y: Float32,
+    facing: Bytes,
     plain: tuple[Any, ...],
-    points: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    tangents: NDArray[np.float64],
-    facings: NDArray[np.uint8],
-    votes: NDArray[np.float64],
+    points: Float,
+    covariances: Float,
+    weights: Float,
+    tangents: Float,
+    facings: Bytes,
+    votes: Float,
     weight: float,
-    prediction: NDArray[np.float64],
-    prior: NDArray[np.float64],
+    prediction: Float,
+    prior: Float,
     every: int,
     few: tuple[Any, ...],
-    pose: NDArray[np.float64],
-    information: NDArray[np.float64],
-    scratch: NDArray[np.float64],
+    pose: Float,
+    information: Float,
+    scratch: Float,
 ) -> tuple[float, float, float, float]:
     """Climb from ``pose``, which is changed, with observations of that ``weight`` in all, if any.
 

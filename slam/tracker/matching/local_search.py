@@ -12,10 +12,9 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import njit
-from slam.frames import Float
+from slam.arrays import Bytes, Float, Int32
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MASK, SHIFT, SIDE, Cells
@@ -51,12 +50,7 @@ class SearchWindow:
 
 @njit
 def _field(  # noqa: C901, PLR0912 (kernel)
-    cells: Cells,
-    short_term: float,
-    i0: int,
-    j0: int,
-    kernel: NDArray[np.float64],
-    out: NDArray[np.uint8],
+    cells: Cells, short_term: float, i0: int, j0: int, kernel: Float, out: Bytes
 ) -> None:
     """Activities smoothed by the (5,) kernel along both axes, in ``out[j - j0, i - i0]``.
 
@@ -105,13 +99,7 @@ def _field(  # noqa: C901, PLR0912 (kernel)
 
 @njit
 def place(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    turns: NDArray[np.float64],
-    cell: float,
-    i0: int,
-    j0: int,
-    out: NDArray[np.int32],
+    points: Float, prediction: Float, turns: Float, cell: float, i0: int, j0: int, out: Int32
 ) -> None:
     """Column and row of each point at each heading, for the predicted position."""
     for h in range(len(turns)):
@@ -130,9 +118,7 @@ def _kernel(sigma: float) -> Float:
     return taps / math.sqrt(math.pi * sigma**2)
 
 
-def field_of(
-    cell_map: CellMap, short_term: float, i0: int, j0: int, field: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
+def field_of(cell_map: CellMap, short_term: float, i0: int, j0: int, field: Bytes) -> Bytes:
     """``field``, which is all 0, filled with smoothed activities from cell (i0, j0) on, which
     begins a block."""
     sigma = cell_map.config.frontend.sigma_cells
@@ -153,9 +139,7 @@ class Around:
         self._low, self._high = np.zeros(2, np.int64), np.zeros(2, np.int64)
         return self
 
-    def fields(
-        self, low: NDArray[np.int32], high: NDArray[np.int32]
-    ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    def fields(self, low: Int32, high: Int32) -> tuple[Int32, Bytes]:
         """Corner of a field that holds the cells from ``low`` to ``high`` (column, row); the field
         and its maxima ahead (2, rows, columns)."""
         if (low < self._low).any() or (high >= self._high).any():

@@ -9,10 +9,8 @@ poses then creeps. Gradient and curvature of that sum are analytic.
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from slam._jit import inlined, inner, uncounted
+from slam.arrays import Bytes, Float, Float32, Int32, Ints
 from slam.frontend.surfaces import opposite, turned_face
 from slam.tracker.cells import MASK, SHIFT, Cells
 
@@ -38,22 +36,22 @@ class Reward(NamedTuple):
 class Seen(NamedTuple):
     """Observations as the kernels see them; fields as in ``Observations``."""
 
-    points: NDArray[np.float64]
-    covariances: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    tangents: NDArray[np.float64]
-    facings: NDArray[np.uint8]
-    votes: NDArray[np.float64]
+    points: Float
+    covariances: Float
+    weights: Float
+    tangents: Float
+    facings: Bytes
+    votes: Float
 
 
 class Field(NamedTuple):
     """The arrays of ``Cells`` that overlaps need: all twelve would be copied at every call."""
 
-    directory: NDArray[np.int32]
-    corner: NDArray[np.int64]
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
-    facing: NDArray[np.uint8]
+    directory: Int32
+    corner: Ints
+    x: Float32
+    y: Float32
+    facing: Bytes
 
 
 class Bell(NamedTuple):
@@ -185,7 +183,7 @@ def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
 
 @inner
 def _turned(
-    covariances: NDArray[np.float64], k: int, c: float, s: float, scale: float
+    covariances: Float, k: int, c: float, s: float, scale: float
 ) -> tuple[float, float, float]:
     """Covariance ``k`` (xx, xy, yy) turned by the angle of cosine c and sine s, in cells."""
     xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
@@ -215,10 +213,10 @@ def evaluate(  # noqa: PLR0913 (kernel)
     cells: Cells,
     reward: Reward,
     seen: Seen,
-    pose: NDArray[np.float64],
-    gradient: NDArray[np.float64],
-    along: NDArray[np.float64],
-    information: NDArray[np.float64],
+    pose: Float,
+    gradient: Float,
+    along: Float,
+    information: Float,
 ) -> tuple[float, float, float]:
     """``evaluated`` on a map."""
     field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
@@ -230,10 +228,10 @@ def evaluated(  # noqa: PLR0913, PLR0915 (kernel)
     field: Field,
     reward: Reward,
     seen: Seen,
-    pose: NDArray[np.float64],
-    gradient: NDArray[np.float64],
-    along: NDArray[np.float64],
-    information: NDArray[np.float64],
+    pose: Float,
+    gradient: Float,
+    along: Float,
+    information: Float,
 ) -> tuple[float, float, float]:
     """Sum of rewards of the observations seen from ``pose``, the weight of those matched, and that
     of those unmatched without a vote.

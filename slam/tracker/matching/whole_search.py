@@ -8,9 +8,8 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slam.frames import Float
+from slam.arrays import Float, Ints, Words
 from slam.tracker.matching import planes
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
@@ -54,7 +53,7 @@ class WholeSearch:
         self._queue: Queue | None = None
         self._state, self._least = planes.MORE, 0  # of the queue; blocks with more are in it
         self._counts, self._bin = np.zeros(BINS, np.int64), BINS  # blocks by bound; those queued
-        self._flats: list[NDArray[np.uint64]] = []  # of each plane
+        self._flats: list[Words] = []  # of each plane
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy without room that is not used."""
@@ -136,7 +135,7 @@ class WholeSearch:
         self._queue = queue._replace(blocks=nodes, keys=keys)
         budget.spend(budget.prices.order_ns * (bounds.size + SORTED * len(nodes)))
 
-    def _nodes(self, flat: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _nodes(self, flat: Ints) -> tuple[Ints, Ints]:
         """Nodes and keys of these of the coarsest blocks, by falling bound."""
         width = self._coarse.planes[self._coarse.widest].shape[0]
         (rows, columns), (_, down, along) = self._sizes(), self._bounds.shape

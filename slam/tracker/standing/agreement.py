@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.odometry_prior import Prediction, inverted, squared, turned
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.uncertainty.covariances import carried

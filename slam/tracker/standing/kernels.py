@@ -4,10 +4,8 @@
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from slam._jit import inlined, inner, uncounted
+from slam.arrays import Bools, Float, Ints
 from slam.frontend.polar import BEARING_OFF, bearing, bin_of
 from slam.frontend.surfaces import apart
 
@@ -48,9 +46,7 @@ def _bin(turns: float, of: Asking, x: float, y: float, shift: float) -> int:
 
 
 @inlined
-def _passed(
-    limit: NDArray[np.float64], of: Asking, x: float, y: float, r: float, turns: float
-) -> bool:
+def _passed(limit: Float, of: Asking, x: float, y: float, r: float, turns: float) -> bool:
     """Whether all beams within the spread went on beyond (x, y) (laser axes) by the margin.
 
     ``r`` m away, and so many bins round by ``bearing``.
@@ -70,7 +66,7 @@ def _passed(
 
 
 @inlined
-def _in_view(limit: NDArray[np.float64], of: Asking, r: float, turns: float) -> bool:
+def _in_view(limit: Float, of: Asking, r: float, turns: float) -> bool:
     """Whether nothing hid a place ``r`` m away, and a beam came that way.
 
     The widest of three bins: at a wall that is seen at a grazing angle each falls short of it.
@@ -86,8 +82,8 @@ def _in_view(limit: NDArray[np.float64], of: Asking, r: float, turns: float) -> 
 
 @inner
 def _polar(
-    points: NDArray[np.float64], seen_from: tuple[float, float, float, float],
-    laser: NDArray[np.float64], step: float, polar: NDArray[np.float64],
+    points: Float, seen_from: tuple[float, float, float, float],
+    laser: Float, step: float, polar: Float,
 ) -> None:  # fmt: skip
     """Where points are about a laser: ``polar`` (4, at least n) x, y, distance, and how many bins
     round by ``bearing``. In a loop of its own, which takes several at once.
@@ -108,16 +104,16 @@ def _polar(
 
 @inner
 def _emptied(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    pose: NDArray[np.float64],
-    lasers: NDArray[np.float64],
-    limits: NDArray[np.float64],
-    ages: NDArray[np.float64],
+    points: Float,
+    pose: Float,
+    lasers: Float,
+    limits: Float,
+    ages: Float,
     of: Asking,
     recent: int,
-    polar: NDArray[np.float64],
-    seen: NDArray[np.float64],
-    out: NDArray[np.float64],
+    polar: Float,
+    seen: Float,
+    out: Float,
 ) -> int:
     """Age of the newest scan that saw the place of each point (robot frame) empty, else inf.
 
@@ -145,13 +141,7 @@ def _emptied(  # noqa: PLR0913 (kernel)
 
 
 @inner
-def _indexed(
-    points: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    step: float,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-) -> None:
+def _indexed(points: Float, T_robot_laser: Float, step: float, first: Ints, last: Ints) -> None:
     """First and last point (robot frame, in order of bearing) of each bin about the laser; -1."""
     c, s = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
     bins = len(first)
@@ -167,17 +157,17 @@ def _indexed(
 
 @inner
 def _left(  # noqa: PLR0913 (kernel)
-    before: NDArray[np.float64],
+    before: Float,
     age: float,
-    points: NDArray[np.float64],
-    T_map_laser: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    limit: NDArray[np.float64],
+    points: Float,
+    T_map_laser: Float,
+    T_robot_laser: Float,
+    limit: Float,
     of: Asking,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    polar: NDArray[np.float64],
-    out: NDArray[np.float64],
+    first: Ints,
+    last: Ints,
+    polar: Float,
+    out: Float,
 ) -> None:
     """Lower ``out`` to ``age`` for points within ``left_m`` of a place that was left.
 
@@ -209,13 +199,7 @@ def _left(  # noqa: PLR0913 (kernel)
 
 @inner
 def _along(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    votes: NDArray[np.float64],
-    reach: float,
-    thin: float,
-    before: NDArray[np.float64],
-    out: NDArray[np.float64],
+    points: Float, joined: Bools, votes: Float, reach: float, thin: float, before: Float, out: Float
 ) -> None:
     """Mean of ``votes`` along the surface of each point, up to ``reach`` m each way.
 
@@ -242,9 +226,7 @@ def _along(  # noqa: PLR0913 (kernel)
 
 
 @uncounted
-def placed(
-    points: NDArray[np.float64], pose: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
+def placed(points: Float, pose: Float, out: Float) -> None:
     """``out`` (n, 2): points of the robot frame in the map."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(points)):
@@ -254,22 +236,22 @@ def placed(
 
 @uncounted
 def votes(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    limit: NDArray[np.float64],
-    pose: NDArray[np.float64],
-    T_map_laser: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    lasers: NDArray[np.float64],
-    limits: NDArray[np.float64],
-    ages: NDArray[np.float64],
-    before: NDArray[np.float64],
-    counts: NDArray[np.int64],
+    points: Float,
+    joined: Bools,
+    limit: Float,
+    pose: Float,
+    T_map_laser: Float,
+    T_robot_laser: Float,
+    lasers: Float,
+    limits: Float,
+    ages: Float,
+    before: Float,
+    counts: Ints,
     asked: tuple[int, float, float],
     plain: tuple[float, float, float, float, float, float, float, float],
-    scratch: NDArray[np.float64],
-    bins: NDArray[np.int64],
-    out: NDArray[np.float64],
+    scratch: Float,
+    bins: Ints,
+    out: Float,
 ) -> float:
     """Fill ``out`` (n,) with the vote of each of the points (robot frame), see ``Standing``.
 

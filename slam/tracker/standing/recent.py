@@ -8,7 +8,8 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slam import se2
-from slam.frames import NS_PER_S, Float
+from slam.arrays import Float
+from slam.frames import NS_PER_S
 from slam.frontend.observations import Observations
 from slam.tracker.standing.agreement import Agreement
 from slam.tracker.standing.config import StandingConfig

@@ -14,7 +14,7 @@ from typing import TypeAlias
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.posegraph import Edge, Pose
 from slam.tracker.tracking.keys import KeyFrame
 

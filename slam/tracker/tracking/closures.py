@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterable
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge

@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.motions import extended
 from slam.frontend.observations import Observations
 from slam.tracker.belief.places import spread

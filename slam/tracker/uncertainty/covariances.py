@@ -7,14 +7,14 @@ Element by element: whole-array expressions take seconds to compile.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
+from slam.arrays import Float
 from slam.frontend.odometry_prior import inverse
 
 
 @inner
-def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.float64]) -> None:
+def _sandwich(f: Float, p: Float, out: Float) -> None:
     """out = f p f' for a symmetric (3, 3) p, exactly symmetric."""
     half = np.zeros((3, 3))
     for i in range(3):
@@ -30,7 +30,7 @@ def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.fl
 
 
 @inner
-def plus(a: NDArray[np.float64], share: float, b: NDArray[np.float64]) -> NDArray[np.float64]:
+def plus(a: Float, share: float, b: Float) -> Float:
     """a + share b."""
     out = np.empty((3, 3))
     for i in range(3):
@@ -40,9 +40,7 @@ def plus(a: NDArray[np.float64], share: float, b: NDArray[np.float64]) -> NDArra
 
 
 @njit
-def observable(
-    geometry: NDArray[np.float64], feigned: float, noisy: float, out: NDArray[np.float64]
-) -> tuple[int, float]:
+def observable(geometry: Float, feigned: float, noisy: float, out: Float) -> tuple[int, float]:
     """``geometry`` without ``noisy`` times what noise feigns of it (``out``).
 
     Returns the number of directions of position in which nothing is left, and the angle (rad) of
@@ -72,9 +70,9 @@ def observable(
 @inner
 def root_share(
     part: tuple[float, float, float],
-    whole: NDArray[np.float64],
+    whole: Float,
     times: float,
-    out: NDArray[np.float64],
+    out: Float,
 ) -> None:
     """``out[:2, :2]``: root of ``times`` the share, at most 1, that ``part`` has of ``whole``.
 
@@ -95,15 +93,15 @@ def root_share(
 
 @inner
 def advance(  # noqa: C901, PLR0913 (kernel)
-    drift: NDArray[np.float64],
-    blind: NDArray[np.float64],
-    shared: NDArray[np.float64],
-    newest: NDArray[np.float64],
-    motion: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    data: NDArray[np.float64],
+    drift: Float,
+    blind: Float,
+    shared: Float,
+    newest: Float,
+    motion: Float,
+    prior: Float,
+    data: Float,
     variances: tuple[float, float, float, float],
-    written: NDArray[np.float64],
+    written: Float,
 ) -> None:
     """One frame; all arrays (3, 3) in the map frame, changed in place but the last three.
 
@@ -155,18 +153,18 @@ def advance(  # noqa: C901, PLR0913 (kernel)
 
 @njit
 def followed(  # noqa: PLR0913 (kernel)
-    drift: NDArray[np.float64],
-    blind: NDArray[np.float64],
-    shared: NDArray[np.float64],
-    newest: NDArray[np.float64],
-    T_map_before: NDArray[np.float64],
-    T_map_robot: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    geometry: NDArray[np.float64],
+    drift: Float,
+    blind: Float,
+    shared: Float,
+    newest: Float,
+    T_map_before: Float,
+    T_map_robot: Float,
+    prior: Float,
+    geometry: Float,
     written: tuple[float, float, float, float, float],
     matched: tuple[float, float, float, float],
     variances: tuple[float, float, float, float],
-    out: NDArray[np.float64],
+    out: Float,
 ) -> tuple[int, float]:
     """One frame: ``root_share`` and ``observable`` of ``geometry``, then ``advance``; their sum in
     ``out`` (3, 3). Returns what ``observable`` does, and (2, 0) where no match was used.
@@ -202,13 +200,7 @@ def followed(  # noqa: PLR0913 (kernel)
 
 
 @njit
-def carried(
-    covariance: NDArray[np.float64],
-    motion: NDArray[np.float64],
-    x: float,
-    y: float,
-    out: NDArray[np.float64],
-) -> None:
+def carried(covariance: Float, motion: Float, x: float, y: float, out: Float) -> None:
     """``out``: a pose's covariance (3, 3) after a known ``motion`` (3,), both in the map frame.
 
     Without the part along the unit vector (x, y); (0, 0): all of it.

@@ -13,10 +13,10 @@ import math
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frames import Float, Odometry
+from slam.arrays import Float
+from slam.frames import Odometry
 from slam.frontend.heading_bias import HeadingBias
 from slam.frontend.odometry_prior import (
     Prediction,
@@ -35,7 +35,7 @@ SLIP_STEP_S = 0.15  # s, longest step: slower scans see no slip twice
 
 
 @inner
-def _across(covariance: NDArray[np.float64], across: tuple[float, float]) -> float:
+def _across(covariance: Float, across: tuple[float, float]) -> float:
     """Variance of the position along a unit vector; of both directions where that is zero."""
     a, b, d = covariance[0, 0], covariance[0, 1], covariance[1, 1]
     x, y = across
@@ -46,10 +46,10 @@ def _across(covariance: NDArray[np.float64], across: tuple[float, float]) -> flo
 
 @njit
 def innovation(
-    stated: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    data: NDArray[np.float64],
-    off: NDArray[np.float64],
+    stated: Float,
+    prior: Float,
+    data: Float,
+    off: Float,
     share: float,
     across: tuple[float, float],
 ) -> tuple[float, float, float, float, float]:
@@ -86,13 +86,13 @@ def innovation(
 
 @njit
 def compared(  # noqa: PLR0913 (kernel)
-    covariance: NDArray[np.float64],
-    carried: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    unscaled: NDArray[np.float64],
+    covariance: Float,
+    carried: Float,
+    prior: Float,
+    unscaled: Float,
     start: float,
-    data: NDArray[np.float64],
-    off: NDArray[np.float64],
+    data: Float,
+    off: Float,
     share: float,
     across: tuple[float, float],
 ) -> tuple[float, float, float, float, float, float, float, float, float]:

@@ -19,7 +19,7 @@ from collections.abc import Callable
 
 import numpy as np
 
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match

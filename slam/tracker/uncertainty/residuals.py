@@ -15,10 +15,9 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
-from slam.frames import Float
+from slam.arrays import Bools, Float
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MASK, MOST_OFF, SHIFT, Cells, named
@@ -49,7 +48,7 @@ def _offset(  # noqa: PLR0913 (kernel)
     v: float,
     variance: float,
     faint_overlap: float,
-    out: NDArray[np.float64],
+    out: Float,
 ) -> bool:
     """How far the point (u, v) lies off the mapped surface (``out``); False where there is none.
 
@@ -127,7 +126,7 @@ def _old(cells: Cells, u: float, v: float) -> tuple[float, float]:
 
 @inner
 def _partner(
-    points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
+    points: Float, joined: Bools, laser: Float,
     first: int, pairing: Pairing,
 ) -> int:  # fmt: skip
     """A point of the same straight surface, far enough from ``first``; -1: there is none."""
@@ -153,9 +152,7 @@ def _partner(
 
 
 @inner
-def _free_standing(
-    points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64], k: int
-) -> bool:
+def _free_standing(points: Float, joined: Bools, laser: Float, k: int) -> bool:
     """Whether point ``k`` is a thing of its own: joined to nothing and nearer than its neighbours.
 
     Where a wall is seen at so grazing an angle that its hits are far apart, they are neither.
@@ -175,11 +172,11 @@ def _free_standing(
 @uncounted
 def _look(  # noqa: PLR0913, PLR0915 (kernel)
     arrays: tuple[Any, ...], short_term: float, cell: float,
-    points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
-    votes: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
-    pose: NDArray[np.float64], start: int, step: int, times: tuple[float, float, float],
-    numbers: tuple[float, float, float, float, float], off: NDArray[np.float64],
-    geometry: NDArray[np.float64], sums: NDArray[np.float64], old: NDArray[np.float64],
+    points: Float, covariances: Float, weights: Float,
+    votes: Float, joined: Bools, laser: Float,
+    pose: Float, start: int, step: int, times: tuple[float, float, float],
+    numbers: tuple[float, float, float, float, float], off: Float,
+    geometry: Float, sums: Float, old: Float,
 ) -> None:  # fmt: skip
     """Add up what ``Evidence`` holds; ``times``: s of one look, of a trace's prior age, and
     since all directions of position were seen. ``arrays`` of ``Cells``, ``numbers`` of ``Pairing``;
