@@ -15,17 +15,10 @@ import numpy as np
 from slam._jit import njit
 from slam.arrays import Float, Float32, Int32
 from slam.estimate import Raster
-from slam.frontend.visibility import View, free_around, seen_empty
+from slam.frontend.visibility import View, seen_empty
 from slam.settings import Settings, number
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import (
-    FREE_COUNT,
-    SIDE,
-    Cells,
-    Look,
-    in_reach,
-    stamped,
-)  # fmt: skip
+from slam.tracker.cells import SIDE, Cells, Look, born, free_at, in_reach, lasting, stamped
 from slam.tracker.config import TrackerConfig
 from slam.tracker.network import Network
 from slam.tracker.standing.config import ALL_VOTE, StandingConfig
@@ -72,30 +65,14 @@ class Odds(NamedTuple):
 @njit
 def _open(cells: Cells, view: View, T_map_laser: Float, cell: float) -> bool:
     """Let every block in view live: a grid also remembers where it saw nothing. False: no room."""
-    ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
-    size = SIDE * cell
-    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, size)
+    laser = (T_map_laser[0], T_map_laser[1], c, s)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, SIDE * cell)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
-            if cells.directory[row, column] >= 0:
-                continue
-            bx = (column + cells.corner[0] + 0.5) * size - ox
-            by = (row + cells.corner[1] + 0.5) * size - oy
-            dx, dy, half = c * bx + s * by, c * by - s * bx, 0.71 * size
-            if free_around(view, dx, dy, half) <= math.sqrt(dx * dx + dy * dy) - half:
-                continue
-            if cells.counts[FREE_COUNT] == 0:
+            hidden = free_at(cells, view, laser, cell, row, column) < 0.0
+            if cells.directory[row, column] < 0 and not hidden and born(cells, row, column) < 0:
                 return False
-            cells.counts[FREE_COUNT] -= 1
-            slot = cells.free[cells.counts[FREE_COUNT]]
-            cells.directory[row, column] = slot
-            cells.x[slot] = 0.0
-            cells.y[slot] = 0.0
-            cells.age[slot] = 0.0
-            cells.facing[slot] = 0
-            cells.off[slot] = 0
-            cells.scratch_of[slot] = -1
     return True
 
 
@@ -113,26 +90,22 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     known, through = 0.0, 0.0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
-    size = SIDE * cell
-    half = 0.71 * size
-    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, size)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, SIDE * cell)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             slot = cells.directory[row, column]
             if slot < 0:
                 continue
             scratch = cells.scratch_of[slot]
-            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
-            bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
-            dx, dy = c * bx + s * by, c * by - s * bx
-            free = free_around(view, dx, dy, half)
-            if scratch < 0 and free <= math.sqrt(dx * dx + dy * dy) - half:
+            free = free_at(cells, view, (ox, oy, c, s), cell, row, column)
+            if scratch < 0 and free < 0.0:
                 continue
+            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
             for jj in range(SIDE):
                 for ii in range(SIDE):
                     given = cells.impression[scratch, jj, ii] if scratch >= 0 else np.float32(0.0)
                     y, age = cells.y[slot, jj, ii], cells.age[slot, jj, ii]
-                    weight = y * age / (age + known_s)
+                    weight = lasting(y, age, known_s)
                     if given == 0.0:
                         px = (i0 + ii + 0.5) * cell - ox
                         py = (j0 + jj + 0.5) * cell - oy

@@ -24,7 +24,6 @@ from slam.tracker.cells import (
     Cells,
     Look,
     living,
-    named,
     no_cells,
     released,
     used,
@@ -40,7 +39,7 @@ MAX_CELLS = 1 << 26  # of a raster, 256 MiB: 245 m square at 3 cm; a larger map 
 
 @uncounted
 def _release(arrays: tuple[Any, ...]) -> None:
-    released(named(arrays))
+    released(Cells(*arrays))
 
 
 class CellMap(abc.ABC):

@@ -18,7 +18,7 @@ from slam.arrays import Bools, Bytes, Float, Float32
 from slam.frontend.observations import Observations
 from slam.frontend.surfaces import turned_face
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Look, named
+from slam.tracker.cells import MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Look, born
 from slam.tracker.map_config import MapConfig
 
 FINE = MapConfig().bell_steps
@@ -40,23 +40,16 @@ def _touch(cells: Cells, column: int, row: int) -> int:
     scratch = cells.counts[TOUCHED_COUNT]
     if scratch == len(cells.touched):
         return -1
-    slot, born = cells.directory[row, column], 0
+    slot, new = int(cells.directory[row, column]), 0
     if slot < 0:
-        if cells.counts[FREE_COUNT] == 0:
+        slot, new = born(cells, row, column), 1
+        if slot < 0:
             return -1
-        cells.counts[FREE_COUNT] -= 1
-        slot = cells.free[cells.counts[FREE_COUNT]]
-        cells.directory[row, column] = slot
-        cells.scratch_of[slot], born = -1, 1
-        for j in range(SIDE):
-            for i in range(SIDE):
-                cells.x[slot, j, i] = cells.y[slot, j, i] = cells.age[slot, j, i] = 0.0
-                cells.facing[slot, j, i] = cells.off[slot, j, i] = 0
     cells.counts[TOUCHED_COUNT] += 1
     cells.touched[scratch, 0] = slot
     cells.touched[scratch, 1] = column + cells.corner[0]
     cells.touched[scratch, 2] = row + cells.corner[1]
-    cells.touched[scratch, 3] = born
+    cells.touched[scratch, 3] = new
     cells.scratch_of[slot] = scratch
     for j in range(SIDE):
         for i in range(SIDE):
@@ -208,7 +201,7 @@ def _stamp(  # noqa: PLR0913 (kernel)
     Returns the index of the point at which room ran out, n where it did not, and -1 where the
     directory does not cover the ``box`` (4,). ``points`` (n, 2) and that box are filled first.
     """
-    cells = named(arrays)
+    cells = Cells(*arrays)
     if start == 0:
         _moved(points_robot, covariances, pose, cell, points, box)
         if not _is_covered(cells, box, SIDE * cell):

@@ -8,7 +8,7 @@ import numpy as np
 
 from slam._jit import inner, njit
 from slam.arrays import Float
-from slam.tracker.cells import MASK, SHIFT, SIDE, Cells
+from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, activity, slot_of
 from slam.tracker.network import Network
 
 MOST = 1 << 14  # peaks returned at most
@@ -16,23 +16,9 @@ MOST = 1 << 14  # peaks returned at most
 
 @inner
 def _value(cells: Cells, short: float, i: int, j: int) -> float:
-    """v = y + (1 - y) short x of neuron (i, j), what the matcher sees; 0 where no block lives."""
-    row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
-    rows, columns = cells.directory.shape
-    if row < 0 or column < 0 or row >= rows or column >= columns:
-        return 0.0
-    slot = cells.directory[row, column]
-    if slot < 0:
-        return 0.0
-    y = cells.y[slot, j & MASK, i & MASK]
-    return float(y + (1.0 - y) * short * cells.x[slot, j & MASK, i & MASK])
-
-
-@inner
-def _age(cells: Cells, i: int, j: int) -> float:
-    """Of the living neuron (i, j), s."""
-    slot = cells.directory[(j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]]
-    return float(cells.age[slot, j & MASK, i & MASK])
+    """What the matcher sees of neuron (i, j); 0 where no block lives."""
+    slot = slot_of(cells, i, j)
+    return float(activity(cells, short, slot, j & MASK, i & MASK)) if slot >= 0 else 0.0
 
 
 @inner
@@ -120,7 +106,8 @@ def _peaks(  # noqa: PLR0913 (kernel)
                 out[count, 1] = (j + 0.5 + _between(near[0, 1], near[1, 1], near[2, 1])) * cell
                 out[count, 2] = here
                 _spread(near, own, out[count, 3:6])
-                out[count, 6] = _age(cells, i, j)
+                slot = cells.directory[row, column]
+                out[count, 6] = cells.age[slot, j & MASK, i & MASK]
                 count += 1
     return count
 

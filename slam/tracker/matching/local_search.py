@@ -17,7 +17,7 @@ from slam._jit import njit
 from slam.arrays import Bytes, Float, Int32
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import MASK, SHIFT, SIDE, Cells
+from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, activity, slot_of
 from slam.tracker.matching.branch_and_bound import SPAN, Lattice, best_of, look_ahead
 from slam.tracker.matching.config import LocalConfig
 
@@ -56,31 +56,22 @@ def _field(  # noqa: C901, PLR0912 (kernel)
 
     (i0, j0) is the corner of a block, ``out`` a whole number of blocks. Zero where no block lives.
     """
-    rows, columns = cells.directory.shape
     padded = np.empty((SIDE + 4, SIDE + 4))
     smooth = np.empty((SIDE + 4, SIDE))
     for block_row in range(out.shape[0] >> SHIFT):
-        row = (j0 >> SHIFT) + block_row - cells.corner[1]
-        if row < 0 or row >= rows:
-            continue
         for block_column in range(out.shape[1] >> SHIFT):
-            column = (i0 >> SHIFT) + block_column - cells.corner[0]
-            if column < 0 or column >= columns or cells.directory[row, column] < 0:
+            left, low = i0 + block_column * SIDE, j0 + block_row * SIDE
+            if slot_of(cells, left, low) < 0:
                 continue
             for a in range(SIDE + 4):
-                r = row + ((a - 2) >> SHIFT)
                 for beside in (-1, 0, 1):  # a block: two of its columns, all, two
                     first, last = max(beside * SIDE + 2, 0), min(beside * SIDE + 2, 4) + SIDE
-                    q, slot = column + beside, np.int32(-1)
-                    if 0 <= r < rows and 0 <= q < columns:
-                        slot = cells.directory[r, q]
+                    slot = slot_of(cells, left + beside * SIDE, low + a - 2)
                     for b in range(first, last):
+                        padded[a, b] = 0.0
                         if slot >= 0:
-                            y = cells.y[slot, (a - 2) & MASK, (b - 2) & MASK]
-                            x = cells.x[slot, (a - 2) & MASK, (b - 2) & MASK]
-                            padded[a, b] = y + (1.0 - y) * short_term * x
-                        else:
-                            padded[a, b] = 0.0
+                            j, i = (a - 2) & MASK, (b - 2) & MASK
+                            padded[a, b] = activity(cells, short_term, slot, j, i)
             for a in range(SIDE + 4):
                 for b in range(SIDE):
                     total = 0.0

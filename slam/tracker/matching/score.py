@@ -10,9 +10,9 @@ import math
 from typing import NamedTuple
 
 from slam._jit import inlined, inner, uncounted
-from slam.arrays import Bytes, Float, Float32, Int32, Ints
+from slam.arrays import Bytes, Float
 from slam.frontend.surfaces import opposite, turned_face
-from slam.tracker.cells import MASK, SHIFT, Cells
+from slam.tracker.cells import MASK, SHIFT, Cells, Field, activity
 
 
 class Reward(NamedTuple):
@@ -42,16 +42,6 @@ class Seen(NamedTuple):
     tangents: Float
     facings: Bytes
     votes: Float
-
-
-class Field(NamedTuple):
-    """The arrays of ``Cells`` that overlaps need: all twelve would be copied at every call."""
-
-    directory: Int32
-    corner: Ints
-    x: Float32
-    y: Float32
-    facing: Bytes
 
 
 class Bell(NamedTuple):
@@ -146,8 +136,8 @@ def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
                     offset += 1.0
                     i += 1
                 while i < end:
-                    x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
-                    value = y + (1.0 - y) * short_term * x
+                    y = field.y[slot, j & MASK, i & MASK]
+                    value = activity(field, short_term, slot, j & MASK, i & MASK)
                     value -= closed * y * (1.0 - y)
                     if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
                         value = 0.0

@@ -17,9 +17,9 @@ from slam import se2
 from slam.arrays import Float
 from slam.posegraph import Edge, Pose
 from slam.tracker.tracking.keys import KeyFrame
+from slam.tracker.uncertainty.covariances import whole
 
-UPPER = [0, 1, 2, 4, 5, 8]  # of (3, 3), row by row; ``WHOLE``: places in these six
-WHOLE = [0, 1, 2, 1, 3, 4, 2, 4, 5]
+UPPER = [0, 1, 2, 4, 5, 8]  # of (3, 3), row by row
 LEVER_M = 5.0  # an error of the heading counts as what it does to a place so far away
 
 Upper: TypeAlias = tuple[float, float, float, float, float, float]  # of (3, 3), row by row
@@ -75,7 +75,7 @@ def map_errors(
                 best = driven = closed
                 T_map_graph = _moved(here, solved[k])
         errors.append(best)
-    return np.array(errors)[:, WHOLE].reshape(-1, 3, 3)
+    return whole(np.array(errors))
 
 
 def _composed(T: Pose, pose: Pose) -> Pose:

@@ -12,6 +12,14 @@ from slam._jit import inner, njit
 from slam.arrays import Float
 from slam.frontend.odometry_prior import inverse
 
+WHOLE = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # places in the upper triangle, of all nine
+
+
+def whole(upper: Float) -> Float:
+    """(..., 3, 3) of the upper triangles (..., 6) of symmetric matrices, row by row."""
+    out: Float = upper[..., WHOLE].reshape(*upper.shape[:-1], 3, 3)
+    return out
+
 
 @inner
 def _sandwich(f: Float, p: Float, out: Float) -> None:
