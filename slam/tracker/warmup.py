@@ -32,7 +32,7 @@ from slam.tracker.rasterise import rasterise
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.recent import Standing
 from slam.tracker.uncertainty.covariances import carried, followed, observable
-from slam.tracker.uncertainty.odometry_noise import compared
+from slam.tracker.uncertainty.odometry_noise import innovation
 from slam.tracker.uncertainty.residuals import look
 
 COMPILE_S = 10.0  # of one core of a Xeon, measured
@@ -59,8 +59,8 @@ def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None
     look(cell_map, 0.3, seen, origin, (1.0, 0.0), 0)
     times = (1.0, 1.0, 1.0, 1.0)
     followed(
-        np.eye(3), np.eye(3), np.eye(3), np.eye(3), origin, origin, covariance, covariance,
-        (1.0, 0.0, 1.0, 1.0, 1.0), times, times, np.eye(3),
+        np.eye(3), np.eye(3), np.eye(3), np.eye(3), origin, covariance, covariance,
+        (1.0, 0.0, 1.0, 1.0, 1.0), times, times,
     )  # fmt: skip
     carried(covariance, origin, 0.0, 0.0, np.eye(3))
     observable(covariance, 0.0, 2.0, np.eye(3))
@@ -71,7 +71,7 @@ def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None
     squared(origin, turned(prior, 0.1))
     HeadingBias().learn(origin, 1.0, (1.0, 1.0), (1.0, 0.0, prior))
     extended(np.zeros(3), np.eye(3), origin, prior)
-    compared(prior, prior, prior, prior, 0.0, prior, origin, 1.0, (0.0, 0.0))
+    innovation(prior, prior, prior, origin, 1.0, (0.0, 0.0))
     for one in (cell_map, *others):
         for write in (False, True):
             rasterise(one, seen, origin)
@@ -80,8 +80,7 @@ def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None
     standing = Standing(StandingConfig(thin_m=0.0))
     standing.add(0, origin, seen)
     standing.with_votes(NS_PER_S // 2, origin, covariance, seen)
-    start = matcher.approach(cell_map, seen, origin, covariance)
-    matcher.climb(cell_map, seen, start, origin, inverted(covariance))
+    matcher.matched(cell_map, seen, origin, inverted(covariance))
     _search(cell_map, matcher, seen)
     cell_map.window(0.0, 0.0, 1.0, 1.0)
     optimise(np.zeros((2, 3)), [Edge(a=0, b=1, T_a_b=origin, information=np.eye(3))])

@@ -15,7 +15,7 @@ import numpy as np
 from slam import se2
 from slam.arrays import Float
 from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.belief.config import RelocaliseConfig
 from slam.tracker.belief.likelihood import told
 from slam.tracker.cell_map import CellMap
@@ -222,9 +222,7 @@ class Places:
         self, observations: Observations, T_map_robot: Float, covariance: Float, budget: Budget
     ) -> Match:
         budget.spend(self._prices.climb_ns * max(len(observations.points_robot), 1))
-        start = self._matcher.approach(self._cell_map, observations, T_map_robot, covariance)
-        precision = inverted(covariance)
-        return self._matcher.climb(self._cell_map, observations, start, T_map_robot, precision)
+        return self._matcher.matched(self._cell_map, observations, T_map_robot, covariance)
 
 
 def novelty(moved: Float) -> float:

@@ -7,7 +7,7 @@ import math
 from typing import Any, NamedTuple
 
 from slam._jit import inner, uncounted
-from slam.arrays import Bytes, Float, Float32, Int32, Ints
+from slam.arrays import Float
 from slam.frontend.odometry_prior import inverse, turn
 from slam.tracker.matching.score import Field, Reward, Seen, evaluated
 
@@ -182,58 +182,32 @@ class Numbers(NamedTuple):
     most: float
 
 
-@inner
-def _numbers(plain: tuple[Any, ...]) -> tuple[Reward, Climb]:
-    r, c = plain[0], plain[1]
-    return (
-        Reward(r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]),
-        Climb(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]),
-    )
-
-
 @uncounted
 def climbed(  # noqa: PLR0913 (kernel)
-    directory: Int32,
-    corner: Ints,
-    x: Float32,
-    y: Float32,
-    facing: Bytes,
-    plain: tuple[Any, ...],
-    points: Float,
-    covariances: Float,
-    weights: Float,
-    tangents: Float,
-    facings: Bytes,
-    votes: Float,
-    weight: float,
-    prediction: Float,
-    prior: Float,
-    every: int,
-    few: tuple[Any, ...],
-    pose: Float,
-    information: Float,
-    scratch: Float,
-) -> tuple[float, float, float, float]:
+    field: tuple[Any, ...], plain: tuple[Any, ...], seen_arrays: tuple[Any, ...], weight: float,
+    prediction: Float, prior: Float, every: int, few: tuple[Any, ...], pose: Float,
+    information: Float, scratch: Float,
+) -> tuple[float, float, float, float]:  # fmt: skip
     """Climb from ``pose``, which is changed, with observations of that ``weight`` in all, if any.
 
     ``every`` > 0: from where every so manieth of them leads, blurred by the ``prior``'s covariance;
-    0: the prior is given by its inverse. ``plain``: ``Numbers``. ``few`` (``Seen``) and ``scratch``
-    (``SCRATCH``): room to work in.
+    0: the prior is given by its inverse. ``field`` of ``Field``, ``plain`` of ``Numbers``,
+    ``seen_arrays`` of ``Seen``. ``few`` (``Seen``) and ``scratch`` (``SCRATCH``): room to work in.
     Returns weight of the reward, matched and overlapped share, and score.
     """
-    field, (reward, climb) = Field(directory, corner, x, y, facing), _numbers(plain)
+    of, reward, climb = Field(*field), Reward(*plain[0]), Climb(*plain[1])
     _, _, full, exponent, enough, least_weight, least, most = plain
-    seen = Seen(points, covariances, weights, tangents, facings, votes)
+    seen = Seen(*seen_arrays)
     precision, blurred = scratch[13:16], scratch[16:19]
     if every > 0:
         inverse(prior, precision)
         turn(prior, -prediction[2], blurred)
-        m = -(-len(points) // every)
+        m = -(-len(seen.points) // every)
         those = Seen(few[0][:m], few[1][:m], few[2][:m], few[3][:m], few[4][:m], few[5][:m])
         widths = Widths(prior[0, 0] + prior[1, 1], least, most)
         if blur(seen, blurred, widths, every, those):
             refine(
-                field, reward, climb, those, pose, prediction, precision, full, information, scratch
+                of, reward, climb, those, pose, prediction, precision, full, information, scratch
             )
     else:
         for a in range(3):
@@ -243,7 +217,7 @@ def climbed(  # noqa: PLR0913 (kernel)
     tau, matched, overlapped, score = full, 0.0, 0.0, -math.inf
     while weight > 0.0:
         rewarded, of_prior, count, absent = refine(
-            field, reward, climb, seen, pose, prediction, precision, tau, information, scratch
+            of, reward, climb, seen, pose, prediction, precision, tau, information, scratch
         )
         overlapped = count / weight
         matched = count / (weight - absent) if count > 0.0 else 0.0

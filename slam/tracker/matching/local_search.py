@@ -19,7 +19,7 @@ from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, activity, slot_of
 from slam.tracker.matching.branch_and_bound import SPAN, Lattice, best_of, look_ahead
-from slam.tracker.matching.config import LocalConfig
+from slam.tracker.matching.config import GlobalConfig, LocalConfig
 
 KEPT = 1 << 23  # bytes of a field that are kept for the next one
 FULL = 255.0  # integer that stands for the field's value 1
@@ -149,14 +149,16 @@ class Around:
         return self._low.astype(np.int32), self._fields
 
 
-def headings(points: Float, window: SearchWindow, cell: float, config: LocalConfig) -> Float:
-    """Turns to try, rad: a far point moves little between two of them."""
-    distances = np.sqrt((points * points).sum(axis=1))
-    far = float(np.sort(distances)[(3 * len(distances)) // 4])
-    step = config.heading_cells * cell / max(far, cell)
-    step = min(max(step, config.finest_rad), config.coarsest_rad)
-    half = math.ceil(window.turn_rad / step)
-    return np.asarray(np.arange(-half, half + 1) * step, dtype=np.float64)
+def heading_step(
+    points: Float, step_m: float, least_m: float, config: LocalConfig | GlobalConfig
+) -> float:
+    """Rad between two headings, with which a far point moves by ``step_m``.
+
+    Far: farther than three quarters of them, and ``least_m``.
+    """
+    distances = np.sort(np.sqrt((points * points).sum(axis=1)))
+    far = float(distances[(3 * len(distances)) // 4])
+    return min(max(step_m / max(far, least_m), config.finest_rad), config.coarsest_rad)
 
 
 def search(  # noqa: PLR0913 (arrays of one problem)
@@ -178,7 +180,9 @@ def search(  # noqa: PLR0913 (arrays of one problem)
         return prediction, 0
     every = math.ceil(len(points) / config.points)
     chosen = np.ascontiguousarray(points[::every])
-    turns = headings(chosen, window, cell, config)
+    step = heading_step(chosen, config.heading_cells * cell, cell, config)
+    half = math.ceil(window.turn_rad / step)
+    turns = np.arange(-half, half + 1) * step
     reach = math.ceil(window.reach_m / cell)
     bases = np.empty((len(turns), len(chosen), 2), np.int32)
     place(chosen, prediction, turns, cell, 0, 0, bases)

@@ -219,54 +219,31 @@ class Matcher:
     def matched(
         self, cell_map: CellMap, observations: Observations, prediction: Float, covariance: Float
     ) -> Match:
-        """The climb from where ``approach`` leads, with the prior that this has."""
-        every = math.ceil(len(observations.points_robot) / self.numbers.climb.few)
-        weight = observations.weight
-        return self._climbed(
-            cell_map, observations, weight, prediction, prediction, covariance, every
-        )
+        """The optimum with that prior, reached from where observations that are blurred by it lead.
 
-    def climb(
-        self,
-        cell_map: CellMap,
-        observations: Observations,
-        start: Float,
-        prediction: Float,
-        precision: Float,
-    ) -> Match:
-        """The local optimum reached from ``start``; the reward's weight falls with the match."""
-        weight = observations.weight
-        return self._climbed(cell_map, observations, weight, start, prediction, precision, 0)
-
-    def approach(
-        self, cell_map: CellMap, observations: Observations, prediction: Float, covariance: Float
-    ) -> Float:
-        """Where to start climbing: the optimum for observations blurred by the prior's own spread.
-
-        Returns the prediction itself where the prior moves no observation by half a cell.
+        They lead from the prediction itself where the prior moves none by half a cell.
         """
         every = math.ceil(len(observations.points_robot) / self.numbers.climb.few)
-        return self._climbed(
-            cell_map, observations, 0.0, prediction, prediction, covariance, every
-        ).T_map_robot
+        return self._climbed(cell_map, observations, prediction, prediction, covariance, every)
 
-    def _climbed(  # noqa: PLR0913 (arrays of one problem)
-        self,
-        cell_map: CellMap,
-        observations: Observations,
-        weight: float,
-        start: Float,
-        prediction: Float,
-        prior: Float,
-        every: int,
-    ) -> Match:
+    def climb(
+        self, cell_map: CellMap, observations: Observations, start: Float, prediction: Float,
+        precision: Float,
+    ) -> Match:  # fmt: skip
+        """The local optimum reached from ``start``; the reward's weight falls with the match."""
+        return self._climbed(cell_map, observations, start, prediction, precision, 0)
+
+    def _climbed(
+        self, cell_map: CellMap, observations: Observations, start: Float, prediction: Float,
+        prior: Float, every: int,
+    ) -> Match:  # fmt: skip
         """As the kernel ``climbed``."""
-        cells, of = cell_map.cells, seen_by(observations)
+        cells, seen = cell_map.cells, tuple(seen_by(observations))
+        field = cells.directory, cells.corner, cells.x, cells.y, cells.facing
         pose, information = np.array(start, dtype=np.float64), np.empty((3, 3))
         tau, matched, overlapped, score = climbed(
-            cells.directory, cells.corner, cells.x, cells.y, cells.facing, self._plain,
-            of.points, of.covariances, of.weights, of.tangents, of.facings, of.votes, weight,
-            prediction, prior, every, self._few, pose, information, self._scratch,
+            field, self._plain, seen, observations.weight, prediction, prior, every, self._few,
+            pose, information, self._scratch,
         )  # fmt: skip
         pose[2] = se2.wrap(float(pose[2]))
         return Match(

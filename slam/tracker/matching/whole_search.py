@@ -14,7 +14,7 @@ from slam.tracker.matching import planes
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.config import GlobalConfig
-from slam.tracker.matching.local_search import place
+from slam.tracker.matching.local_search import heading_step, place
 from slam.tracker.matching.planes import LARGE, SPAN, Queue, bound_blocks, flatten, open_nodes
 
 FIRST_ROOM = 1 << 22  # nodes of the heap: 64 MiB, no memory until used; growing copies all of it
@@ -79,14 +79,16 @@ class WholeSearch:
     def _begin(self, budget: Budget) -> None:
         """Lay out the candidates."""
         coarse = self._coarse
-        self._turns = headings(self._points, coarse.pitch, self._config)
+        step = heading_step(self._points, coarse.pitch, coarse.pitch, self._config)
+        count = math.ceil(math.tau / step)
+        self._turns: Float = np.arange(count) * (math.tau / count)  # all round
         self._reach = tuple(math.ceil(0.5 * n) for n in coarse.shape)  # rows, columns
         i0, j0 = (c + coarse.margin for c in coarse.corner)
         rows, columns = coarse.shape
         self._middle = np.array([i0 + 0.5 * columns, j0 + 0.5 * rows, 0.0]) * coarse.pitch
         if self._about is not None:
             self._middle, reach_m, turn_rad = self._about
-            step = float(self._turns[1])
+            step = math.tau / count
             half, reach = math.ceil(turn_rad / step), math.ceil(reach_m / coarse.pitch)
             self._turns = step * np.arange(-half, half + 1, dtype=np.float64)
             self._reach = reach, reach
@@ -190,12 +192,3 @@ class WholeSearch:
         first, self._given = self._given, int(self._queue.counts[planes.TAKEN])
         scale = np.array([self._coarse.pitch, self._coarse.pitch, 1.0])
         return [self._middle + offset * scale for offset in self._queue.taken[first : self._given]]
-
-
-def headings(points: Float, pitch: float, config: GlobalConfig) -> Float:
-    """Turns to try, rad: all round, so that a far point moves by about one pitch between two."""
-    distances = np.sort(np.sqrt((points * points).sum(axis=1)))
-    far = float(distances[(3 * len(distances)) // 4])
-    step = min(max(pitch / max(far, pitch), config.finest_rad), config.coarsest_rad)
-    count = math.ceil(math.tau / step)
-    return np.asarray(np.arange(count) * (math.tau / count), dtype=np.float64)

@@ -248,6 +248,12 @@ class Evidence:
     old: Float
     old_off_m2: float
 
+    @property
+    def recent(self) -> Float:
+        """(7,) ``new_geometry``, feigned, weighed, in_view, and 1 look."""
+        rest = self.feigned, self.weighed, self.in_view, 1.0
+        return np.array([*self.new_geometry.tolist(), *rest])
+
 
 def look(
     cell_map: CellMap,

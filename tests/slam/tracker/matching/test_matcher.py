@@ -190,11 +190,9 @@ def test_coming_near_helps_where_the_heading_is_vague() -> None:
     network, matcher = room(), Matcher(CONFIG)
     truth = np.array([0.02, -0.01, 0.05])
     seen = from_scan(room_scan(truth), np.zeros(3), CONFIG)
-    sure, vague = np.diag([1e-6, 1e-6, 1e-8]), np.diag([4e-4, 4e-4, 9e-4])
-    still = matcher.approach(network, seen, np.zeros(3), sure)
-    np.testing.assert_array_equal(still, np.zeros(3))
-    start = matcher.approach(network, seen, np.zeros(3), vague)
-    np.testing.assert_allclose(start, truth, atol=0.02)
+    vague = np.diag([4e-4, 4e-4, 9e-4])
+    match = matcher.matched(network, seen, np.zeros(3), vague)
+    np.testing.assert_allclose(match.T_map_robot, truth, atol=0.005)
 
 
 def test_deskewing_puts_beams_where_they_were_measured() -> None:
