@@ -2,9 +2,10 @@
 """A SLAM on a map of cells, whatever the map: scan matching, uncertainty, relocalisation, loops."""
 
 import abc
+import functools
+import gc
 import math
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -12,6 +13,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
+from slam._jit import announced
 from slam.arrays import Float, Float32
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Estimate
@@ -20,6 +22,7 @@ from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction, turned
 from slam.path import PosePath
 from slam.tracker import map_file as memory
+from slam.tracker import warmup
 from slam.tracker.belief.belief import Belief, Judged
 from slam.tracker.belief.places import coarse
 from slam.tracker.belief.state import State
@@ -28,12 +31,12 @@ from slam.tracker.cells import MOST_OFF
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
+from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
 from slam.tracker.uncertainty.residuals import Evidence, look
-from slam.tracker.warmup import warm_up
 from slam.trajectory import Trajectory
 
 
@@ -54,10 +57,18 @@ class Tracker(abc.ABC):
         self.reset()
 
     @classmethod
+    @functools.cache
     def _get_ready(cls) -> None:
-        """Compile, the first time in a process."""
-        # mypy takes a class of dataclasses for unhashable
-        warm_up(cls.config_class, cls._new_map, cls._new_submap)  # type: ignore[arg-type]
+        """Compile, the first time in a process: run every kernel once on a little room."""
+        slam = cls.__new__(cls)
+        slam.config = cls.config_class(cell_m=0.2, standing=StandingConfig(thin_m=0.0))
+        with announced("the SLAM's kernels", warmup.COMPILE_S):
+            slam.reset()
+            for k in range(4):
+                slam.update(warmup.frame(k))
+            warmup.search(slam.cell_map, slam._new_submap(slam.config), slam._matcher)
+        gc.collect()
+        gc.freeze()  # the compiler's objects stay: looking through them takes 100 ms of a scan
 
     def reset(self) -> None:
         """Forget everything; the next frame is the origin of the map."""
@@ -70,7 +81,7 @@ class Tracker(abc.ABC):
         self._standing = Standing(self.config.standing)
         self._believe(self._matcher.match)
         new_map = self._map_anew if self.map_moves else None
-        new_submap = partial(self._new_submap, self.config)
+        new_submap = functools.partial(self._new_submap, self.config)
         self._loops = Loops(self.config, self._matcher, new_submap, new_map)
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()

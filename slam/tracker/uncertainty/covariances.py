@@ -122,7 +122,9 @@ def advance(  # noqa: PLR0913 (kernel)
     (3, 3): root of the share of the map in view that was written lately, by directions; it is off
     by what odometry was off then. What the data take off odometry's error is the map's by as much.
     """
-    F, N, kept = np.eye(3), np.eye(3), np.empty((3, 3))
+    F, unit, kept = np.zeros((3, 3)), np.zeros((3, 3)), np.empty((3, 3))
+    for i in range(3):
+        F[i, i] = unit[i, i] = 1.0
     F[0, 2], F[1, 2] = -motion[1], motion[0]
     _sandwich(F, drift, drift)
     # odometry's: what the data leave of it
@@ -132,7 +134,7 @@ def advance(  # noqa: PLR0913 (kernel)
     precision = inverse_of(whole)
     left = product(inverse_of(plus(data, 1.0, precision)), precision)
     _sandwich(left, whole, blind)
-    _sandwich(plus(N, -1.0, left), moved, kept)
+    _sandwich(plus(unit, -1.0, left), moved, kept)
     _sandwich(written, kept, kept)
     # the shared error, as far as the data decide over the time that it stays the same
     _sandwich(inverse_of(plus(data, 1.0 / variances[2], inverse_of(prior))), data, moved)
