@@ -21,7 +21,7 @@ from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import SIDE, Cells, Look, born, free_at, in_reach, lasting, stamped
 from slam.tracker.config import TrackerConfig
 from slam.tracker.network import Network
-from slam.tracker.standing.config import ALL_VOTE, StandingConfig
+from slam.tracker.standing.config import FULL_WEIGHT, StandingConfig
 from slam.tracker.tracker import Tracker
 
 OCTOMAP = "Hornung et al. 2013"
@@ -49,7 +49,7 @@ class OccupancyConfig(TrackerConfig):
     Every return has full weight: the grid stays what it is elsewhere.
     """
 
-    standing: StandingConfig = field(default=ALL_VOTE)
+    standing: StandingConfig = field(default=FULL_WEIGHT)
     grid: GridConfig = field(default=GridConfig())
 
 

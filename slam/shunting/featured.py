@@ -123,7 +123,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
         agreed = self._agreed(observations, prediction)
         if int(agreed.accepted.sum()) < self.config.features.enough_pairs:
             return self._matcher.match(observations, prediction, cell_map)
-        pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
+        pulling = dataclasses.replace(observations, shares=agreed.accepted.astype(np.float64))
         if self.config.objective == "log":
             # Eq. (13) as printed, from where the pairs lead: the sum of the logarithms of overlaps
             match = self._matcher.climb(

@@ -36,7 +36,7 @@ from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
-from slam.tracker.uncertainty.residuals import Evidence, look
+from slam.tracker.uncertainty.residuals import Residuals, residuals_of
 from slam.trajectory import Trajectory
 
 
@@ -118,12 +118,12 @@ class Tracker(abc.ABC):
         self._correct()
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
-        observations = self._standing.with_votes(
+        observations = self._standing.weighted(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
         judged = self._judge(observations, prediction)  # 3 Eq. (13), and whether it is believed
-        evidence = self._update_map(observations, judged)  # 4 residuals, then 5 Eq. (8)
-        trust = self._update_uncertainty(observations, judged, evidence)  # 6 pose, odometry noise
+        residuals = self._update_map(observations, judged)  # 4 residuals, then 5 Eq. (8)
+        trust = self._update_uncertainty(observations, judged, residuals)  # 6 pose, odometry noise
         self._add_to_path(observations, judged)  # 7 key frames for loops
         match, state = judged.match, judged.state
         if state is State.TRACKING or not self._belief.certain:
@@ -188,7 +188,7 @@ class Tracker(abc.ABC):
         before.
         """
         relocalise = self.config.tracking.relocalise
-        if observations.weight >= relocalise.least_weight:
+        if observations.amount >= relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = prediction.changed(carried=self._pose_covariance.odometry_part(motion))
         judged = self._belief.judge(self.cell_map, observations, prediction)
@@ -197,7 +197,7 @@ class Tracker(abc.ABC):
             self._pose_covariance.relocated(coarse(relocalise))
         return judged
 
-    def _update_map(self, observations: Observations, judged: Judged) -> Evidence | None:
+    def _update_map(self, observations: Observations, judged: Judged) -> Residuals | None:
         """Let the map see the frame, where the pose is believed.
 
         Returns what the observed surfaces said about it before, where the robot was tracked to it.
@@ -205,12 +205,14 @@ class Tracker(abc.ABC):
         """
         match, elapsed = judged.match, judged.prediction.elapsed
         T_map_robot, step = match.T_map_robot, min(elapsed, self.config.map.longest_look_s)
-        tracked, evidence = judged.state is State.TRACKING, None
+        tracked, residuals = judged.state is State.TRACKING, None
         if tracked or judged.followed:
             short_term, turn = self._matcher.reward.short_term, self._loops.n_frames
             times = step, self._pose_covariance.unseen_s
-            evidence = look(self.cell_map, short_term, observations, T_map_robot, times, turn)
-        old = np.zeros(6) if evidence is None else evidence.old
+            residuals = residuals_of(
+                self.cell_map, short_term, observations, T_map_robot, times, turn
+            )
+        old = np.zeros(6) if residuals is None else residuals.old
         self._standing.agreement.hold(old, elapsed)
         if judged.writes:
             self.cell_map.off_cm = math.ceil(min(100.0 * self._pose_covariance.off_m, MOST_OFF))
@@ -219,10 +221,10 @@ class Tracker(abc.ABC):
             self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
             if tracked:
                 self._belief.learn(judged)
-        return evidence if tracked else None
+        return residuals if tracked else None
 
     def _update_uncertainty(
-        self, observations: Observations, judged: Judged, evidence: Evidence | None
+        self, observations: Observations, judged: Judged, residuals: Residuals | None
     ) -> float:
         """Returns how far the matched returns are trusted, in [0, 1]."""
         match, prediction = judged.match, judged.prediction
@@ -230,10 +232,10 @@ class Tracker(abc.ABC):
         lasting, now = agreement.left_behind(), agreement.covariance()
         if match.slipped:  # found by a search, among what does not fit there
             lasting = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
-        self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
+        self._pose_covariance.update(self._T_map_robot, prediction, match, residuals)
         matched = match.tau > 0.0 and not match.slipped
-        if evidence is not None and matched:
-            self._pose_covariance.held(agreement.shown, evidence.old_off_m2, prediction.elapsed)
+        if residuals is not None and matched:
+            self._pose_covariance.held(agreement.shown, residuals.old_off_m2, prediction.elapsed)
         self._pose_covariance.dragged(lasting, now)
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
             self._odometry_noise.note_slip(prediction, match)
@@ -244,7 +246,7 @@ class Tracker(abc.ABC):
             self._odometry_noise.learn(prediction, match, sigma_m, along_rad)
         else:
             self._odometry_noise.nis = None
-        return observations.mean_vote
+        return observations.mean_weight
 
     def _add_to_path(self, observations: Observations, judged: Judged) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is uncertain."""

@@ -107,7 +107,7 @@ class Belief:
         local = cell_map if doubt is None else doubt.local
         match = near(self._match(observations, prediction, local), prediction)
         if prediction.elapsed <= OFTEN_S:
-            self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
+            self._agreement.take(prediction, match.T_map_robot, observations.mean_weight)
             match = self._undragged(cell_map, observations, match)
         share = self._matcher.usual.share(match, observations)
         least = config.tracking.relocalise.goes_on
@@ -154,7 +154,7 @@ class Belief:
         Against it no more than by what it sees through: what is hidden denies nothing.
         """
         config = self._matcher.config
-        if observations.weight < config.tracking.relocalise.least_weight:
+        if observations.amount < config.tracking.relocalise.least_weight:
             return True, 0.0
         nats = told(config.belief, share)
         if doubt is None:
@@ -174,7 +174,7 @@ class Belief:
         """What a match to the copy is on the map of before the doubt."""
         if doubt.local is doubt.cell_map:
             return match
-        there, everyone = match.T_map_robot, observations.with_votes(None)
+        there, everyone = match.T_map_robot, observations.weighted(None)
         return self._matcher.climb(doubt.cell_map, everyone, there, there, STILL)
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
@@ -214,11 +214,11 @@ class Belief:
         self, doubt: Doubt, observations: Observations, prediction: Prediction, goes_on: bool
     ) -> Judged:
         """Other places are asked, and one is taken if it is certain."""
-        config, everyone = self._matcher.config, observations.with_votes(None)
+        config, everyone = self._matcher.config, observations.weighted(None)
         prices, frozen_above = config.matching.budget, config.belief.frozen_above
         lost = self.p_lost > 0.5 or not goes_on
         budget = Budget(prices, prices.lost_share if lost else prices.frozen_share)
-        if everyone.weight >= config.tracking.relocalise.least_weight:
+        if everyone.amount >= config.tracking.relocalise.least_weight:
             doubt.places.follow(everyone, prediction, budget)
         else:
             doubt.places.wait(prediction)
@@ -249,12 +249,12 @@ class Belief:
         """The best place as far around as a slip may have led."""
         numbers = self._matcher.config.tracking.relocalise
         doubt.since_near_s += prediction.elapsed
-        if doubt.since_near_s < numbers.again_near_s or everyone.weight < numbers.least_near:
+        if doubt.since_near_s < numbers.again_near_s or everyone.amount < numbers.least_near:
             return None
         doubt.since_near_s, self.busy = 0.0, max(self.busy, 0.5)
         every = max(1, len(everyone.points_robot) // numbers.near_points)
-        points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
-        few = replace(everyone, points_robot=points, weights=weights)
+        points, shares = everyone.points_robot[::every], everyone.shares[::every] * every
+        few = replace(everyone, points_robot=points, shares=shares)
         turn = min(math.pi, max(numbers.near_rad, numbers.near_rad_s * prediction.elapsed))
         loose = inverted(spread(numbers.near_m, turn))
         window = SearchWindow(reach_m=numbers.near_m, turn_rad=turn)

@@ -73,7 +73,7 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     Newton's method with Levenberg damping; a step is taken only if it rises, but for the last, tiny
     one. The slope of the reward along observed surfaces is left out of it: there it only says where
     the map is older, which would hold a robot back in a corridor. Returns reward, prior, the weight
-    of matched observations and that of unmatched ones without a vote, and leaves the data's
+    of matched observations and that of unmatched ones without weight, and leaves the data's
     information (without tau and prior) in ``information``, all as before the last step. What is in
     the first 13 rows of ``scratch`` does not matter.
     """
@@ -158,9 +158,9 @@ def blur(seen: Seen, covariance: Float, widths: Widths, every: int, out: Seen) -
         out.covariances[m, 0] = seen.covariances[k, 0] + a * share
         out.covariances[m, 1] = seen.covariances[k, 1] + b * share
         out.covariances[m, 2] = seen.covariances[k, 2] + d * share
-        out.weights[m] = seen.weights[k] * every
+        out.shares[m] = seen.shares[k] * every
         out.tangents[m, 0], out.tangents[m, 1] = seen.tangents[k, 0], seen.tangents[k, 1]
-        out.facings[m], out.votes[m] = seen.facings[k], seen.votes[k]
+        out.facings[m], out.weights[m] = seen.facings[k], seen.weights[k]
     return blurred
 
 
@@ -184,11 +184,11 @@ class Numbers(NamedTuple):
 
 @uncounted
 def climbed(  # noqa: PLR0913 (kernel)
-    field: tuple[Any, ...], plain: tuple[Any, ...], seen_arrays: tuple[Any, ...], weight: float,
+    field: tuple[Any, ...], plain: tuple[Any, ...], seen_arrays: tuple[Any, ...], amount: float,
     prediction: Float, prior: Float, every: int, few: tuple[Any, ...], pose: Float,
     information: Float, scratch: Float,
 ) -> tuple[float, float, float, float]:  # fmt: skip
-    """Climb from ``pose``, which is changed, with observations of that ``weight`` in all, if any.
+    """Climb from ``pose``, which is changed, with observations of that ``amount`` in all, if any.
 
     ``every`` > 0: from where every so manieth of them leads, blurred by the ``prior``'s covariance;
     0: the prior is given by its inverse. ``field`` of ``Field``, ``plain`` of ``Numbers``,
@@ -215,12 +215,12 @@ def climbed(  # noqa: PLR0913 (kernel)
                 precision[a, b] = prior[a, b]
     information[:] = 0.0
     tau, matched, overlapped, score = full, 0.0, 0.0, -math.inf
-    while weight > 0.0:
+    while amount > 0.0:
         rewarded, of_prior, count, absent = refine(
             of, reward, climb, seen, pose, prediction, precision, tau, information, scratch
         )
-        overlapped = count / weight
-        matched = count / (weight - absent) if count > 0.0 else 0.0
+        overlapped = count / amount
+        matched = count / (amount - absent) if count > 0.0 else 0.0
         score = full * rewarded + of_prior
         tempered = max(full * matched**exponent, least_weight)
         if tau < full or tempered > enough * tau:

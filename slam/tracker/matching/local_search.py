@@ -192,7 +192,7 @@ def search(  # noqa: PLR0913 (arrays of one problem)
     high = np.array([columns.max(), rows.max()]) + edge
     corner, (field, ahead) = around.fields(low, high)
     bases -= corner
-    scale = gain * float(observations.weights.mean()) * len(points) / len(chosen) / FULL
+    scale = gain * float(observations.shares.mean()) * len(points) / len(chosen) / FULL
     lattice = Lattice(
         field=field,
         ahead=ahead,

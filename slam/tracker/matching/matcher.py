@@ -29,18 +29,18 @@ LEAST = 1e-9  # shares are divided by the usual one
 
 
 def seen_by(observations: Observations) -> Seen:
-    """The arrays of ``observations``; all votes are 1 where nothing is known of them.
+    """The arrays of ``observations``; all weights are 1 where nothing is known of them.
 
     Every second point of a scan is copied: kernels are compiled once, for points without gaps.
     """
     return Seen(
         np.ascontiguousarray(observations.points_robot),
         observations.covariances,
-        observations.weights,
+        observations.shares,
         observations.tangents,
         observations.facings,
-        np.ones(len(observations.points_robot)) if observations.votes is None
-        else observations.votes,
+        np.ones(len(observations.points_robot)) if observations.weights is None
+        else observations.weights,
     )  # fmt: skip
 
 
@@ -51,7 +51,7 @@ class Match:
     T_map_robot  (3,) best pose
     information  (3, 3) of the data alone, by (x, y, theta) in the map frame
     matched      share of the observations that overlap the map, 0 without observations; what does
-                 not, and has no vote (``tracker.standing``), is left out of it
+                 not, and has no weight (``tracker.standing``), is left out of it
     overlapped   the same share of all observations
     score        reward at full weight - 1/2 Mahalanobis^2: comparable between matches of a frame
     tau          weight the reward had in the end
@@ -242,7 +242,7 @@ class Matcher:
         field = cells.directory, cells.corner, cells.x, cells.y, cells.facing
         pose, information = np.array(start, dtype=np.float64), np.empty((3, 3))
         tau, matched, overlapped, score = climbed(
-            field, self._plain, seen, observations.weight, prediction, prior, every, self._few,
+            field, self._plain, seen, observations.amount, prediction, prior, every, self._few,
             pose, information, self._scratch,
         )  # fmt: skip
         pose[2] = se2.wrap(float(pose[2]))

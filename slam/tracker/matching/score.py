@@ -38,10 +38,10 @@ class Seen(NamedTuple):
 
     points: Float
     covariances: Float
-    weights: Float
+    shares: Float
     tangents: Float
     facings: Bytes
-    votes: Float
+    weights: Float
 
 
 class Bell(NamedTuple):
@@ -224,7 +224,7 @@ def evaluated(  # noqa: PLR0913, PLR0915 (kernel)
     information: Float,
 ) -> tuple[float, float, float]:
     """Sum of rewards of the observations seen from ``pose``, the weight of those matched, and that
-    of those unmatched without a vote.
+    of those unmatched without weight.
 
     Fills the gradient (3,) by (x, y, theta), the part of it ``along`` the observed surfaces, and
     the information (3, 3): the negative curvature, of each observation only where it is positive,
@@ -245,25 +245,25 @@ def evaluated(  # noqa: PLR0913, PLR0915 (kernel)
         if a != alike[0] or b != alike[1] or d != alike[2]:
             alike, bell = (a, b, d), _bell(a, b, d, reward.tail, reward.tail_cells)
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
-        vote = seen.votes[k]
-        closed = reward.young_trace * (1.0 - vote)
+        weight = seen.weights[k]
+        closed = reward.young_trace * (1.0 - weight)
         faced = turned_face(seen.facings[k], pose[2])
-        f, gx, gy, a, b, d = _overlap(field, reward.short_term * vote, closed, u, v, bell, faced)
+        f, gx, gy, a, b, d = _overlap(field, reward.short_term * weight, closed, u, v, bell, faced)
         if f > reward.matched_overlap:
-            matched += seen.weights[k]
+            matched += seen.shares[k]
         else:
-            absent += seen.weights[k] * (1.0 - vote)
+            absent += seen.shares[k] * (1.0 - weight)
         gx, gy = gx * scale, gy * scale
         a, b, d = a * scale * scale, b * scale * scale, d * scale * scale
         if reward.logarithm:
             inverse = 1.0 / (reward.log_floor + f)
-            score += seen.weights[k] * math.log(reward.log_floor + f)
+            score += seen.shares[k] * math.log(reward.log_floor + f)
             gx, gy = gx * inverse, gy * inverse
             a, b, d = a * inverse + gx * gx, b * inverse + gx * gy, d * inverse + gy * gy
         else:
-            score += seen.weights[k] * f
+            score += seen.shares[k] * f
         a, b, d = _positive_part(a, b, d)
-        w = seen.weights[k]
+        w = seen.shares[k]
         gx, gy, a, b, d = w * gx, w * gy, w * a, w * b, w * d
         gradient[0] += gx
         gradient[1] += gy

@@ -83,7 +83,7 @@ class Standing:
             least_s = next((older_s for older_s in self._ages_s if older_s > age_s), math.inf)
         return chosen
 
-    def with_votes(
+    def weighted(
         self, stamp_ns: int, T_map_robot: Float, prior: Float, seen: Observations
     ) -> Observations:
         """With the weight of each return in [0, 1], and the share of them that was in view before.
@@ -93,7 +93,7 @@ class Standing:
         config, points, n = self._config, seen.points_robot, len(seen.points_robot)
         kept = self._asked(stamp_ns, seen.view.step) if config.settled_s > 0.0 else []
         if not kept or not n:
-            return seen.with_votes(np.ones(n))
+            return seen.weighted(np.ones(n))
         place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])
         spread = math.radians(config.spread_deg) + config.sigmas * math.sqrt(heading)
         asking = Asking(
@@ -127,4 +127,4 @@ class Standing:
         scratch, bins = np.empty((6, max(n, *counts) + 1)), np.empty((2, len(now.limit)), np.int64)
         weights = np.empty(n)
         in_view = weigh(tuple(now), tuple(asked), tuple(asking), scratch, bins, weights)
-        return seen.with_votes(weights, in_view)
+        return seen.weighted(weights, in_view)

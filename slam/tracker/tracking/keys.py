@@ -90,7 +90,7 @@ class KeyFrames:
             KeyFrame(
                 frame=frame,
                 T_map_robot=T_map_robot,
-                observations=seen.with_votes(None),
+                observations=seen.weighted(None),
                 step=self._step,
                 covariance=self._covariance + self.slack,
                 way_m=self.way_m,

@@ -24,7 +24,7 @@ from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import carried, followed
-from slam.tracker.uncertainty.residuals import Evidence
+from slam.tracker.uncertainty.residuals import Residuals
 
 LEAST = 1e-9  # m^2: numerical guard
 SINGULAR = np.diag([1e-6, 1e-6, 1e-8])  # m^2, m^2, rad^2: numerical guard
@@ -95,19 +95,19 @@ class PoseCovariance:
         return out
 
     def update(
-        self, T_map_before: Float, prediction: Prediction, match: Match, evidence: Evidence | None
+        self, T_map_before: Float, prediction: Prediction, match: Match, residuals: Residuals | None
     ) -> None:
         """Take the motion from ``T_map_before`` and the match at its end in.
 
-        Without ``evidence`` the match was not used: odometry alone moved the robot.
+        Without ``residuals`` the match was not used: odometry alone moved the robot.
         """
         config, elapsed = self._config, prediction.elapsed
         strength, new, times = 0.0, 0.0, 0.0
-        if evidence is not None:
-            self._learn(evidence, elapsed)
+        if residuals is not None:
+            self._learn(residuals, elapsed)
             (xx, _, _), (_, yy, _), _ = match.information.tolist()
             strength = match.tau * (xx + yy)
-            new = evidence.new / max(evidence.weighed, 1e-9)
+            new = residuals.new / max(residuals.weighed, 1e-9)
             times = config.written
         new_xx, new_xy, new_yy, feigned, weighed, in_view, looks = self._recent.tolist()
         used = strength > 0.0 and weighed > config.forgotten
@@ -173,13 +173,13 @@ class PoseCovariance:
         self.along_rad = None if self.along_rad is None else self.along_rad + by
         self.covariance = self._drift + self._blind + self._shared
 
-    def _learn(self, evidence: Evidence, elapsed: float) -> None:
+    def _learn(self, residuals: Residuals, elapsed: float) -> None:
         keep = math.exp(-elapsed / self._config.shared_s)
-        self._products = keep * self._products + evidence.shared
-        self._pairs = keep * self._pairs + evidence.paired
+        self._products = keep * self._products + residuals.shared
+        self._pairs = keep * self._pairs + residuals.paired
         keep = math.exp(-elapsed / self._config.view_s)
-        self._geometry = keep * self._geometry + evidence.geometry
-        self._recent = keep * self._recent + evidence.recent
+        self._geometry = keep * self._geometry + residuals.geometry
+        self._recent = keep * self._recent + residuals.recent
 
 
 def _far(covariance: Float) -> float:

@@ -28,7 +28,7 @@ SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
 OLD_S = 8.0  # s for which a surface was looked at, at which it counts half as old; set by hand
 
 
-NO_VOTES = np.empty(0)
+NO_WEIGHTS = np.empty(0)
 
 
 class Pairing(NamedTuple):
@@ -158,15 +158,15 @@ def _free_standing(points: Float, joined: Bools, laser: Float, k: int) -> bool:
 @uncounted
 def _look(  # noqa: PLR0913, PLR0915 (kernel)
     arrays: tuple[Any, ...], short_term: float, cell: float,
-    points: Float, covariances: Float, weights: Float,
-    votes: Float, joined: Bools, laser: Float,
+    points: Float, covariances: Float, shares: Float,
+    weights: Float, joined: Bools, laser: Float,
     pose: Float, start: int, step: int, times: tuple[float, float, float],
     numbers: tuple[float, float, float, float, float], off: Float,
     geometry: Float, sums: Float, old: Float,
 ) -> None:  # fmt: skip
-    """Add up what ``Evidence`` holds; ``times``: s of one look, of a trace's prior age, and
+    """Add up what ``Residuals`` holds; ``times``: s of one look, of a trace's prior age, and
     since all directions of position were seen. ``arrays`` of ``Cells``, ``numbers`` of ``Pairing``;
-    no ``votes``: all have one. ``off`` (2,): room to work in."""
+    no ``weights``: all have one. ``off`` (2,): room to work in."""
     cells, pairing = Cells(*arrays), Pairing(*numbers)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     surfaces = False
@@ -182,7 +182,7 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         if k < 0 and surfaces and not _free_standing(points, joined, laser, first):
             continue
         # what moves says nothing of how far the map is off, nor is it new map
-        w = weights[first] * votes[first] if len(votes) > 0 else weights[first]
+        w = shares[first] * weights[first] if len(weights) > 0 else shares[first]
         sums[WEIGHED] += w
         age = _age(cells, u, v) + times[0] + times[1]
         sums[NEW] += w * times[0] / age
@@ -218,7 +218,7 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence:
+class Residuals:
     """What a sample of one frame's points shows.
 
     geometry  (3, 3) weighted sum over matched points of the outer product of their normal's
@@ -255,14 +255,14 @@ class Evidence:
         return np.array([*self.new_geometry.tolist(), *rest])
 
 
-def look(
+def residuals_of(
     cell_map: CellMap,
     short_term: float,
     seen: Observations,
     T_map_robot: Float,
     times: tuple[float, float],
     turn: int,
-) -> Evidence:
+) -> Residuals:
     """Compare a sample of what is ``seen`` from ``T_map_robot`` with the map, before it is written.
 
     ``times``: s since the last frame, and since all directions of position were seen; ``turn``
@@ -280,13 +280,13 @@ def look(
     geometry, sums, old = np.zeros(6), np.zeros(8), np.zeros(8)
     elapsed, since_s = times
     _look(
-        tuple(cell_map.cells), short_term, cell, seen.points_robot, seen.covariances, seen.weights,
-        NO_VOTES if seen.votes is None else seen.votes, seen.joined, seen.T_robot_laser,
+        tuple(cell_map.cells), short_term, cell, seen.points_robot, seen.covariances, seen.shares,
+        NO_WEIGHTS if seen.weights is None else seen.weights, seen.joined, seen.T_robot_laser,
         T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed), since_s), pairing,
         np.empty(2), geometry, sums, old,
     )  # fmt: skip
     shared, paired, feigned, new, weighed = sums[:NEW_XX].tolist()
-    return Evidence(
+    return Residuals(
         geometry=whole(geometry),
         weighed=weighed,
         in_view=weighed * step,
