@@ -23,27 +23,6 @@ def test_a_live_neuron_costs_few_bytes() -> None:
     assert slam.network.bytes_per_neuron() <= 48.0
 
 
-def test_blocks_of_impressions_that_are_forgotten_die() -> None:
-    """A look from a wrong pose that is taken back leaves neither blocks nor slots behind."""
-    slam = ShuntingSlam(CONFIG)
-    for frame in STREAM[:5]:
-        slam.update(frame.without_truth())
-    network = slam.network
-    directory, unused = network.cells.directory.copy(), int(network.cells.counts[FREE_COUNT])
-    assert STREAM[0].scan is not None
-    observations = from_scan(STREAM[0].scan, np.zeros(3), CONFIG)
-    slots = len(network.cells.free)
-    for k in range(20):
-        rasterise(network, observations, np.array([30.0 + k, 0.3 * k, 0.1 * k]))
-        network.release()
-    _, places = living(network.cells)
-    assert len(places) == (directory >= 0).sum()
-    born = len(network.cells.free) - slots
-    assert int(network.cells.counts[FREE_COUNT]) == unused + born
-    assert len(np.unique(network.cells.free[: unused + born])) == unused + born
-    assert network.cells.counts[TOUCHED_COUNT] == 0
-
-
 def test_every_slot_is_either_free_or_lives_once() -> None:
     """Whatever comes and goes, no slot is lost and none is given twice."""
     rng = np.random.default_rng(2)

@@ -20,7 +20,7 @@ from slam.tracker.belief.likelihood import (
     sum_of,
     told,
 )
-from tests.slam.tracker.belief.drives import FAST, ROOMS, at, blind_turn, mapped, still
+from tests.slam.tracker.belief.drives import FAST, ROOMS, at, mapped, still
 from tests.slam.tracker.belief.drives import told as said
 from tests.world2d import going_on
 
@@ -62,14 +62,6 @@ def test_the_prior_adds_up_over_a_gap_however_often_it_is_asked(steps: int) -> N
     for _ in range(steps):
         nats = sum_of([nats, carried(2.0, 100.0 / steps)])
     assert nats == pytest.approx(math.log(2.0 * 100.0 / S_PER_H))
-
-
-def test_who_was_blind_for_long_may_have_been_carried_all_that_while() -> None:
-    system, last = mapped(ROOMS)
-    before = system._belief._unknown
-    said(system, blind_turn(last, steps=50, said_rad=0.0, sd_rad=0.01))
-    expected = sum_of([before, carried(FAST.carried_per_h, 10.0)])
-    assert system._belief._unknown == pytest.approx(expected)
 
 
 def test_what_scans_say_of_the_motion_is_bounded_either_way(

@@ -10,14 +10,11 @@ import pytest
 from slam import se2
 from slam.estimate import Estimate
 from slam.frames import Frame
-from slam.frontend.observations import Observations, observe
+from slam.frontend.observations import Observations
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.tracker.belief.doubt import Doubt
 from slam.tracker.belief.places import Place, Places
 from slam.tracker.belief.state import State
-from slam.tracker.cells import used
 from slam.tracker.matching.budget import Budget
-from slam.tracker.matching.matcher import Matcher
 from slam.tracker.tracker import Tracker
 from tests.slam.tracker.belief.drives import (
     DOUBTFUL,
@@ -104,16 +101,6 @@ def test_who_is_carried_to_nowhere_known_is_lost_and_not_trusted(kind: type[Trac
     assert set(states(said[1:])) == {"lost"}
     assert all(one.diagnostics["p_lost"] >= 0.5 for one in said[1:])
     assert said[-1].covariance[0, 0] > 1.0
-
-
-def test_a_carried_robot_is_told_the_same_each_time() -> None:
-    one, other = (
-        [words for _, words in carried(ShuntingSlam, ROOMS, PLACE, 2.0)[1]] for _ in range(2)
-    )
-    for a, b in zip(one, other, strict=True):
-        np.testing.assert_array_equal(a.T_map_robot, b.T_map_robot)
-        np.testing.assert_array_equal(a.covariance, b.covariance)
-        assert a.diagnostics == b.diagnostics
 
 
 @pytest.mark.parametrize("kind", SLAMS)
@@ -290,35 +277,6 @@ def test_no_scan_of_a_lost_robot_does_more_than_its_budget_and_it_is_found(
     counted = max(prices.lost_share, prices.frozen_share) * budget_ms * 1e6
     match_ns = 361 * prices.climb_ns + 90 * prices.approach_ns
     assert 0.0 < max(spent) <= counted + match_ns  # the item at which it is spent
-
-
-@pytest.mark.parametrize("kind", SLAMS)
-def test_what_the_local_copy_sees_is_not_in_the_map(kind: type[Tracker]) -> None:
-    system, stream = made(kind), frames(World2D(arena()), TURN, rate_hz=5.0, seed=3)
-    told(system, stream[:30])
-    before = [array.copy() for array in system.cell_map.cells]
-    doubt = Doubt(system.cell_map, Matcher(system.config))
-    assert doubt.local is system.cell_map
-    observations = observe(stream[30], np.zeros(3), system.config)
-    for _ in range(20):
-        doubt.write(observations, np.array([0.4, -0.3, 0.2]), 0.2)
-    for one, other in zip(before, system.cell_map.cells, strict=True):
-        np.testing.assert_array_equal(one, other)
-    assert not np.array_equal(doubt.local.cells.y, system.cell_map.cells.y)
-
-
-def test_the_local_copy_grows_no_further_than_by_its_bound(monkeypatch: pytest.MonkeyPatch) -> None:
-    """Who is lost for hours drives through more than is ever matched again."""
-    monkeypatch.setattr("slam.tracker.belief.doubt.MOST_NEW", 40)
-    system, last = mapped(ROOMS)
-    lost = Doubt(system.cell_map, Matcher(system.config))
-    frame = going_on(still(ROOMS, at(system), 0.2), last)[0]
-    seen, known, grown = observe(frame, np.zeros(3), system.config), used(system.cell_map.cells), []
-    for k in range(20):
-        lost.write(seen, np.array([20.0 * (k + 1), 0.0, 0.0]), 0.2)
-        grown.append(used(lost.local.cells) - known)
-    assert 40 < max(grown) <= 40 + 2 * grown[0]
-    assert used(system.cell_map.cells) == known
 
 
 @pytest.mark.parametrize("hidden", [False, True])

@@ -195,26 +195,6 @@ def test_coming_near_helps_where_the_heading_is_vague() -> None:
     np.testing.assert_allclose(match.T_map_robot, truth, atol=0.005)
 
 
-def test_deskewing_puts_beams_where_they_were_measured() -> None:
-    """A robot turning on the spot, each beam cast from the pose at its own time."""
-    spec = laser(361, interlaced=True)
-    twist = np.array([0.5, 0.0, 2.5])
-    poses = np.array(
-        [se2.compose(se2.exp(twist, float(t)), spec.T_robot_laser) for t in spec.beam_time_offsets]
-    )
-    world = World2D(rectangle(-5.0, -4.0, 5.0, 4.0))
-    ranges = world.ranges(0.0, poses, spec.angles, 80.0).astype(np.float32)
-    scan = Scan(stamp_ns=0, ranges=ranges, spec=spec)
-    ends = np.stack([np.cos(poses[:, 2] + spec.angles), np.sin(poses[:, 2] + spec.angles)], 1)
-    truth = poses[:, :2] + ranges[:, None].astype(np.float64) * ends
-    moved = from_scan(scan, twist, CONFIG).points_robot
-    order = np.argsort(np.arctan2(truth[:, 1], truth[:, 0] - 0.1), kind="stable")
-    at_stamp = np.stack([np.cos(spec.angles), np.sin(spec.angles)], 1)
-    still = spec.T_robot_laser[:2] + ranges[:, None].astype(np.float64) * at_stamp
-    assert np.abs(moved - truth[order]).max() < 1e-4
-    assert np.abs(still - truth).max() > 0.1
-
-
 def test_prior_comes_from_the_frames_own_covariance() -> None:
     covariance = np.diag([0.04, 0.01, 0.0025])
     before = Odometry(stamp_ns=0, T_odom_robot=np.array([1.0, 2.0, 0.3]))

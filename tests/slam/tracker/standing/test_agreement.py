@@ -113,13 +113,6 @@ def test_surface_that_was_in_view_holds_for_half_a_second() -> None:
     assert shares[-1] > 0.5
 
 
-def test_the_spread_is_the_sum_squared() -> None:
-    agreement = fed(np.tile([SIGMA[0], -SIGMA[1], 0.0], (100, 1)))
-    S = to_movers(agreement)
-    assert agreement.covariance() == pytest.approx(np.outer(S, S), rel=1e-9)
-    assert S[1] == pytest.approx(-S[0])
-
-
 def test_what_the_window_forgets_stays_in_the_map() -> None:
     """What is left behind adds up to the whole spread."""
     agreement = fed(np.tile([SIGMA[0], 0.0, 0.0], (100, 1)))

@@ -111,20 +111,6 @@ def test_all_vote_without_earlier_scans_and_when_it_is_off() -> None:
     assert seen_by(off.weighted(NS_PER_S // 5, HERE, SURE, now)).weights.min() == 1.0
 
 
-def test_scans_are_kept_for_seconds_at_any_rate_and_few_are_asked() -> None:
-    scan = seen()
-    for period_ns in (26_666_667, 213_333_333, NS_PER_S):
-        standing = Standing(NUMBERS)
-        for k in range(20 * NS_PER_S // period_ns):
-            standing.add(k * period_ns, HERE, scan)
-        now_ns = (k + 1) * period_ns
-        asked = [now_ns - look.stamp_ns for look in standing._asked(now_ns, scan.view.step)]
-        assert asked[0] == period_ns
-        assert len(asked) <= NUMBERS.views + 1
-        assert asked == sorted(asked)
-        assert 4 * NS_PER_S < asked[-1] < 12 * NS_PER_S
-
-
 def test_with_all_votes_a_match_is_bit_for_bit_one_without() -> None:
     network, matcher, scan = room(), Matcher(CONFIG), seen()
     same = np.ones(len(scan.points_robot))
