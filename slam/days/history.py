@@ -186,9 +186,9 @@ class News:
         since = self._since_ns[places[:, 1], places[:, 0]]
         self._note(places[since == _NEVER], frame.stamp_ns)
         new = frame.stamp_ns - np.minimum(since, frame.stamp_ns) <= NEWS_S * NS_PER_S
-        told = np.zeros(len(ends), np.bool_)
-        told[beams[new]] = True
-        return float(told.mean())
+        is_news = np.zeros(len(ends), np.bool_)
+        is_news[beams[new]] = True
+        return float(is_news.mean())
 
     def _note(self, places: Ints, now_ns: int) -> None:
         """From now on these places are news, and those so near that they are of one thing."""

@@ -254,8 +254,7 @@ class StartSearch:
             for one in now:
                 at = se2.compose(late.T_map_own, one.T_own_robot)
                 match = self._known.matched(one.observations, at, covariance)
-                told = late.place.told + KEPT_ANEW * self._places.told(match)
-                late.place = replace(late.place, told=told, anew=late.place.anew + KEPT_ANEW)
+                late.place = late.place.asked_again(KEPT_ANEW, self._places.evidence(match))
             if not late.unasked:
                 self._late.pop(0)
                 self._weigh(late, pose)

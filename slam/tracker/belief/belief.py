@@ -18,7 +18,7 @@ from slam.arrays import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.belief.doubt import Doubt
-from slam.tracker.belief.likelihood import MOST_NATS, carried, probabilities, sum_of, told
+from slam.tracker.belief.likelihood import MOST_NATS, carried, evidence, probabilities, sum_of
 from slam.tracker.belief.places import Place, novelty, spread
 from slam.tracker.belief.state import State
 from slam.tracker.cell_map import CellMap
@@ -115,7 +115,7 @@ class Belief:
         if doubt is None and odd and per_h > 0.0:
             doubt = Doubt(cell_map, self._matcher)
         if doubt is not None:
-            doubt.told = doubt.places.told(self._on_map(doubt, observations, match))
+            doubt.evidence = doubt.places.evidence(self._on_map(doubt, observations, match))
         goes_on, nats = self._going_on(doubt, observations, match, share)
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_LOST)
         if goes_on:
@@ -156,16 +156,16 @@ class Belief:
         config = self._matcher.config
         if observations.amount < config.tracking.relocalise.least_weight:
             return True, 0.0
-        nats = told(config.belief, share)
+        nats = evidence(config.belief, share)
         if doubt is None:
             return True, max(nats, 0.0)
         look = seen_at(doubt.cell_map, observations, match.T_map_robot)
         denied_m = look.through - config.belief.hidden_m
         seen = self._matcher.usual.share(match, observations, LEAST_IN_VIEW)
         if seen < config.tracking.relocalise.goes_on and denied_m > look.known:
-            nats = min(nats, doubt.told)  # the map denies more than it explains
+            nats = min(nats, doubt.evidence)  # the map denies more than it explains
         elif self._unknown > 0.0:  # who was carried away goes on from scans there, too
-            nats = min(nats, max(doubt.told, 0.0))
+            nats = min(nats, max(doubt.evidence, 0.0))
         if nats >= 0.0:
             return True, nats
         return False, max(nats, -config.belief.hidden * max(denied_m, 0.0))
@@ -269,8 +269,8 @@ class Belief:
         """Whether the robot slipped to a place nearby, which is certain against one that the map
         does not know, too.
         """
-        config, nats = self._matcher.config.belief, doubt.places.told(found)
-        p = probabilities([0.0, self._unknown, nats - doubt.told + math.log(config.slips)])[2]
+        config, nats = self._matcher.config.belief, doubt.places.evidence(found)
+        p = probabilities([0.0, self._unknown, nats - doubt.evidence + math.log(config.slips)])[2]
         sure = min(p, probabilities([0.0, nats])[1]) >= 1.0 - config.frozen_above
         return sure and gain_m(doubt.cell_map, everyone, found, doubt.match) >= config.more_m
 
@@ -282,7 +282,7 @@ class Belief:
         asked = place.scans >= config.again and novelty(place.way) >= ENOUGH
         explained = place.latest > 0.0 and place.waited == 0
         broken = self._unknown > 0.0 or not goes_on
-        better = probabilities([0.0, place.latest - doubt.told])[1] >= 1.0 - config.frozen_above
+        better = probabilities([0.0, place.latest - doubt.evidence])[1] >= 1.0 - config.frozen_above
         if not (asked and explained and better and broken):
             return False
         return gain_m(doubt.cell_map, everyone, place.match, doubt.match) >= config.far_m

@@ -128,7 +128,7 @@ class Agreement:
         return np.multiply.outer(self._by_movers, self._by_movers)
 
     def left_behind(self) -> Float:
-        """(3, 3) the part of that which the window is about to forget: the map's from now on.
+        """(3, 3) the part of that which the window is about to forget, and which the map keeps.
 
         It is handed over once, until the next match.
         """
