@@ -16,6 +16,7 @@ from slam import se2
 from slam._jit import inlined, inner, uncounted
 from slam.arrays import Bools, Bytes, Float, Float32
 from slam.frontend.observations import Observations
+from slam.frontend.odometry_prior import rotate
 from slam.frontend.surfaces import turned_face
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Look, born
@@ -211,9 +212,8 @@ def _stamp(  # noqa: PLR0913 (kernel)
     scale = 1.0 / (cell * cell)
     for k in range(start, len(points)):
         xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
-        a = (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale
-        b = (c * s * (xx - yy) + (c * c - s * s) * xy) * scale
-        d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale
+        a, b, d = rotate(c, s, xx, xy, yy)
+        a, b, d = a * scale, b * scale, d * scale
         u, v = points[k, 0] / cell - 0.5, points[k, 1] / cell - 0.5
         faced = turned_face(facings[k], theta)
         if not _rasterise_point(cells, u, v, (a, b, d), faced, ends, bell):

@@ -34,7 +34,7 @@ LEAST_IN_VIEW = 0.6  # share: who was carried sees little of what was in view; s
 ENOUGH = 0.5  # of the novelty of a place far away, before it is taken; set by hand
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Judged:
     """What is to be done with a scan.
 
@@ -184,10 +184,8 @@ class Belief:
             doubt.match = match
             doubt.places.wait(prediction)
         self._weigh(doubt)
-        return Judged(
-            match=match, prediction=prediction, state=State.BLIND, cell_map=cell_map,
-            writes=doubt is None, followed=False,
-        )  # fmt: skip
+        writes = doubt is None
+        return Judged(match, prediction, State.BLIND, cell_map, writes=writes, followed=False)
 
     def learn(self, judged: Judged) -> None:
         """The map took a scan in."""
@@ -195,10 +193,7 @@ class Belief:
 
     def _settled(self, cell_map: CellMap, match: Match, prediction: Prediction) -> Judged:
         self._doubt = None
-        tracking = State.TRACKING
-        return Judged(
-            match=match, prediction=prediction, state=tracking, cell_map=cell_map, writes=True
-        )
+        return Judged(match, prediction, State.TRACKING, cell_map, writes=True)
 
     def _weigh(self, doubt: Doubt | None) -> None:
         """Probabilities of the places that are followed, and of not being where motion led."""
@@ -238,10 +233,7 @@ class Belief:
         if goes_on:
             doubt.write(observations, doubt.match.T_map_robot, prediction.elapsed)
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
-        return Judged(
-            match=doubt.match, prediction=prediction, state=state, cell_map=doubt.cell_map,
-            followed=goes_on,
-        )  # fmt: skip
+        return Judged(doubt.match, prediction, state, doubt.cell_map, followed=goes_on)
 
     def _nearby(
         self, doubt: Doubt, everyone: Observations, prediction: Prediction, budget: Budget
@@ -292,18 +284,13 @@ class Belief:
         numbers = self._matcher.config.tracking.relocalise
         wide = replace(prediction, covariance=spread(numbers.near_m, numbers.near_rad))
         self._found()
-        return Judged(
-            match=replace(found, slipped=True), prediction=wide, state=State.TRACKING, writes=True,
-            cell_map=doubt.cell_map,
-        )  # fmt: skip
+        slipped = replace(found, slipped=True)
+        return Judged(slipped, wide, State.TRACKING, doubt.cell_map, writes=True)
 
     def _relocated(self, doubt: Doubt, place: Place, prediction: Prediction) -> Judged:
         """The robot is at a place far away."""
         self._found()
-        return Judged(
-            match=place.match, prediction=prediction, state=State.RELOCATED,
-            cell_map=doubt.cell_map,
-        )  # fmt: skip
+        return Judged(place.match, prediction, State.RELOCATED, doubt.cell_map)
 
     def _found(self) -> None:
         self._doubt, self.p_lost, self._unknown = None, 0.0, -MOST_NATS

@@ -11,6 +11,7 @@ from typing import NamedTuple
 
 from slam._jit import inlined, inner, uncounted
 from slam.arrays import Bytes, Float
+from slam.frontend.odometry_prior import rotate
 from slam.frontend.surfaces import opposite, turned_face
 from slam.tracker.cells import MASK, SHIFT, Cells, Field, activity
 
@@ -172,19 +173,6 @@ def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
 
 
 @inner
-def _turned(
-    covariances: Float, k: int, c: float, s: float, scale: float
-) -> tuple[float, float, float]:
-    """Covariance ``k`` (xx, xy, yy) turned by the angle of cosine c and sine s, in cells."""
-    xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
-    return (
-        (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale * scale,
-        (c * s * (xx - yy) + (c * c - s * s) * xy) * scale * scale,
-        (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
-    )
-
-
-@inner
 def _positive_part(a: float, b: float, d: float) -> tuple[float, float, float]:
     """[[a, b], [b, d]] without its eigenvectors of a negative eigenvalue."""
     mean, half = 0.5 * (a + d), 0.5 * (a - d)
@@ -241,7 +229,9 @@ def evaluated(  # noqa: PLR0913, PLR0915 (kernel)
     for k in range(len(seen.points)):
         rx = c * seen.points[k, 0] - s * seen.points[k, 1]
         ry = s * seen.points[k, 0] + c * seen.points[k, 1]
-        a, b, d = _turned(seen.covariances, k, c, s, scale)
+        xx, xy, yy = seen.covariances[k, 0], seen.covariances[k, 1], seen.covariances[k, 2]
+        a, b, d = rotate(c, s, xx, xy, yy)
+        a, b, d = a * scale * scale, b * scale * scale, d * scale * scale
         if a != alike[0] or b != alike[1] or d != alike[2]:
             alike, bell = (a, b, d), _bell(a, b, d, reward.tail, reward.tail_cells)
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5

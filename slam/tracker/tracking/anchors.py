@@ -15,6 +15,7 @@ import numpy as np
 
 from slam import se2
 from slam.arrays import Float
+from slam.frontend.odometry_prior import rotated
 from slam.posegraph import Edge, Pose
 from slam.tracker.tracking.keys import KeyFrame
 from slam.tracker.uncertainty.covariances import whole
@@ -114,9 +115,7 @@ def _turned(covariance: Upper, theta: float) -> Upper:
     """``odometry_prior.turned``."""
     c, s = math.cos(theta), math.sin(theta)
     xx, xy, xt, yy, yt, tt = covariance
-    a = c * c * xx - 2.0 * c * s * xy + s * s * yy
-    b = c * s * (xx - yy) + (c * c - s * s) * xy
-    d = s * s * xx + 2.0 * c * s * xy + c * c * yy
+    a, b, d = rotated(c, s, xx, xy, yy)
     return a, b, c * xt - s * yt, d, s * xt + c * yt, tt
 
 
