@@ -12,7 +12,6 @@ seeing something else there. At zero the object goes.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
@@ -29,6 +28,7 @@ from slam.frontend.odometry_prior import assumed_covariance
 from slam.frontend.polar import hidden, polar
 from slam.landmarks.association import METHODS
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
+from slam.landmarks.hypotheses import Association
 from slam.path import OnPath, PosePath
 
 CHANCE = 0.05  # probability of something else where a landmark was; set by hand
@@ -139,20 +139,6 @@ PRESETS: dict[str, Callable[..., EkfConfig]] = {
 }
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Pairs:
-    """``landmarks`` (k,) the landmark of each point or -1; ``plausible`` (k,) whether one is near
-    enough to explain it, taken or not."""
-
-    landmarks: Ints
-    plausible: Bools
-
-    @property
-    def matched(self) -> int:
-        """Number of pairs."""
-        return int((self.landmarks >= 0).sum())
-
-
 class EkfSlam(OnPath):
     """EKF-SLAM on point landmarks: IPJC association, landmarks that are confirmed and deleted.
 
@@ -249,10 +235,10 @@ class EkfSlam(OnPath):
             self.filter.predict(increment, covariance)
         self._before = odometry
 
-    def _correct(self, points: Float, covariances: Float, confirmed: Bools) -> _Pairs:
+    def _correct(self, points: Float, covariances: Float, confirmed: Bools) -> Association:
         """Pair points with confirmed landmarks, then with candidates; update with each."""
         landmarks = np.full(len(points), -1)
-        plausible = np.zeros(len(points), dtype=np.bool_)
+        plausible, cost = np.zeros(len(points), dtype=np.bool_), 0.0
         for stage in (confirmed, ~confirmed):
             chosen = np.flatnonzero(stage)
             near = chosen[self._within_reach(chosen)]
@@ -263,9 +249,10 @@ class EkfSlam(OnPath):
             found = method(self.filter, near, points[free], covariances[free], self._gates)
             landmarks[free] = found.landmarks
             plausible[free] |= found.plausible
+            cost += found.cost
             pairs = free[found.landmarks >= 0]
             self.filter.update(landmarks[pairs], points[pairs], covariances[pairs])
-        return _Pairs(landmarks=landmarks, plausible=plausible)
+        return Association(landmarks=landmarks, cost=cost, plausible=plausible)
 
     def _within_reach(self, chosen: Ints) -> Bools:
         """What could be seen if the pose is off by three standard deviations."""
@@ -287,7 +274,7 @@ class EkfSlam(OnPath):
             return expected & unhidden_by_beams(landmarks_laser, frame.scan)
         return expected & unhidden_by_features(landmarks_robot, points, self.config)
 
-    def _judge(self, pairs: _Pairs, expected: Bools, confirmed: Bools) -> None:
+    def _judge(self, pairs: Association, expected: Bools, confirmed: Bools) -> None:
         """Count frames in which nothing expected was met; delete what is gone or left behind."""
         if pairs.matched:
             self._unmatched = 0

@@ -76,36 +76,26 @@ class CellMap(abc.ABC):
 
     def cover(self, xmin: float, ymin: float, xmax: float, ymax: float) -> None:
         """Grow the directory so that blocks may be born anywhere in the rectangle (m)."""
-        size = SIDE * self.cell
-        rows, columns = self.cells.directory.shape
-        cx, cy = (int(v) for v in self.cells.corner)
-        low = (min(cx, math.floor(xmin / size) - 1), min(cy, math.floor(ymin / size) - 1))
-        high = (
-            max(cx + columns, math.floor(xmax / size) + 2),
-            max(cy + rows, math.floor(ymax / size) + 2),
-        )
-        if low == (cx, cy) and high == (cx + columns, cy + rows):
+        size, first = SIDE * self.cell, self.cells.corner
+        shape = np.array(self.cells.directory.shape[::-1])
+        last = first + shape
+        low = np.minimum(first, np.floor(np.array([xmin, ymin]) / size).astype(np.int64) - 1)
+        high = np.maximum(last, np.floor(np.array([xmax, ymax]) / size).astype(np.int64) + 2)
+        if (low == first).all() and (high == last).all():
             return
         # Grow by half of the present extent on the side that asks, so that growing stays rare.
-        low = (
-            low[0] - columns // 2 if low[0] < cx else cx,
-            low[1] - rows // 2 if low[1] < cy else cy,
-        )
-        high = (
-            high[0] + columns // 2 if high[0] > cx + columns else cx + columns,
-            high[1] + rows // 2 if high[1] > cy + rows else cy + rows,
-        )
-        across, along = high[0] - low[0], high[1] - low[1]
+        low = np.where(low < first, low - shape // 2, first)
+        high = np.where(high > last, high + shape // 2, last)
+        across, along = (high - low).tolist()
         if max(across, along) > MAX_BLOCKS_ACROSS or across * along > MAX_DIRECTORY:
             raise InvalidValueError(
                 f"the map would be {across * size:.0f} m x {along * size:.0f} m across; "
                 f"cell_m = {self.cell} is too small for this stream, or its poses jump"
             )
-        grown = np.full((high[1] - low[1], high[0] - low[0]), -1, np.int32)
-        grown[cy - low[1] : cy - low[1] + rows, cx - low[0] : cx - low[0] + columns] = (
-            self.cells.directory
-        )
-        self.cells = self.cells._replace(directory=grown, corner=np.array(low, np.int64))
+        grown = np.full((along, across), -1, np.int32)
+        (i, j), (columns, rows) = (first - low).tolist(), shape.tolist()
+        grown[j : j + rows, i : i + columns] = self.cells.directory
+        self.cells = self.cells._replace(directory=grown, corner=low)
 
     def grow(self) -> None:
         """Make room where a kernel ran out of it."""

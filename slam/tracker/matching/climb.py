@@ -116,25 +116,15 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     return rewarded, prior, matched, absent
 
 
-class Widths(NamedTuple):
-    """Sums of two variances, m^2.
-
-    place  of the prior's position
-    least  a blur of no more is none
-    most   of the blur: it is shrunk to this
-    """
-
-    place: float
-    least: float
-    most: float
-
-
 @inner
-def blur(seen: Seen, covariance: Float, widths: Widths, every: int, out: Seen) -> bool:
+def blur(  # noqa: PLR0913 (kernel)
+    seen: Seen, covariance: Float, place: float, least: float, most: float, every: int, out: Seen
+) -> bool:
     """Fill ``out`` with one of ``every`` so many, smeared by a pose's (3, 3) ``covariance``.
 
     That one is in the robot frame. False, and ``out`` is not to be used, where it smears none of
-    them by more than ``widths.least``.
+    them by more than ``least``; the smear is shrunk to ``most``. Both are sums of two variances,
+    m^2, and so is ``place``, that of the prior's position.
     """
     xx, xy, xt = covariance[0, 0], covariance[0, 1], covariance[0, 2]
     yy, yt, tt = covariance[1, 1], covariance[1, 2], covariance[2, 2]
@@ -142,7 +132,7 @@ def blur(seen: Seen, covariance: Float, widths: Widths, every: int, out: Seen) -
     for k in range(len(seen.points)):
         x, y = seen.points[k, 0], seen.points[k, 1]
         farthest = max(farthest, x * x + y * y)
-    if 2.0 * (widths.place + farthest * tt) < widths.least:  # (a + b)^2 <= 2 (a^2 + b^2)
+    if 2.0 * (place + farthest * tt) < least:  # (a + b)^2 <= 2 (a^2 + b^2)
         return False
     blurred = False
     for m in range(len(out.points)):
@@ -152,8 +142,8 @@ def blur(seen: Seen, covariance: Float, widths: Widths, every: int, out: Seen) -
         a = xx - 2.0 * xt * y + tty * y
         b = xy + xt * x - yt * y - ttx * y
         d = yy + 2.0 * yt * x + ttx * x
-        blurred |= a + d > widths.least
-        share = min(1.0, widths.most / max(a + d, 1e-12))
+        blurred |= a + d > least
+        share = min(1.0, most / max(a + d, 1e-12))
         out.points[m, 0], out.points[m, 1] = x, y
         out.covariances[m, 0] = seen.covariances[k, 0] + a * share
         out.covariances[m, 1] = seen.covariances[k, 1] + b * share
@@ -169,7 +159,7 @@ class Numbers(NamedTuple):
 
     reward, climb  of ``Reward`` and ``Climb``, plain too
     full, exponent, tempered, least_weight  how the weight of the reward falls with the match
-    least, most    of ``Widths``
+    least, most    of ``blur``
     """
 
     reward: tuple[Any, ...]
@@ -204,8 +194,7 @@ def climbed(  # noqa: PLR0913 (kernel)
         turn(prior, -prediction[2], blurred)
         m = -(-len(seen.points) // every)
         those = Seen(few[0][:m], few[1][:m], few[2][:m], few[3][:m], few[4][:m], few[5][:m])
-        widths = Widths(prior[0, 0] + prior[1, 1], least, most)
-        if blur(seen, blurred, widths, every, those):
+        if blur(seen, blurred, prior[0, 0] + prior[1, 1], least, most, every, those):
             refine(
                 of, reward, climb, those, pose, prediction, precision, full, information, scratch
             )
