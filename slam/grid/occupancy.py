@@ -12,7 +12,7 @@ from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
 
-from slam._jit import njit
+from slam._jit import njit, uncounted
 from slam.arrays import Float, Float32, Int32
 from slam.estimate import Raster
 from slam.frontend.visibility import View, seen_empty
@@ -62,7 +62,7 @@ class Odds(NamedTuple):
     struck: float
 
 
-@njit
+@uncounted
 def _open(cells: Cells, view: View, T_map_laser: Float, cell: float) -> bool:
     """Let every block in view live: a grid also remembers where it saw nothing. False: no room."""
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
@@ -76,7 +76,7 @@ def _open(cells: Cells, view: View, T_map_laser: Float, cell: float) -> bool:
     return True
 
 
-@njit
+@uncounted
 def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     cells: Cells, log_odds: Float32, view: View, T_map_laser: Float,
     cell: float, step: float, odds: Odds, known_s: float, off: int, write: bool,

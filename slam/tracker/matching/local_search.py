@@ -13,7 +13,7 @@ from typing import Self
 
 import numpy as np
 
-from slam._jit import njit
+from slam._jit import njit, uncounted
 from slam.arrays import Bytes, Float, Int32
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
@@ -48,16 +48,16 @@ class SearchWindow:
         return cls(reach_m=config.reach_m, turn_rad=config.turn_rad)
 
 
-@njit
-def _field(  # noqa: C901, PLR0912 (kernel)
-    cells: Cells, short_term: float, i0: int, j0: int, kernel: Float, out: Bytes
+@uncounted
+def _field(  # noqa: C901, PLR0912, PLR0913 (kernel)
+    cells: Cells, short_term: float, i0: int, j0: int, kernel: Float, out: Bytes, room: Float
 ) -> None:
     """Activities smoothed by the (5,) kernel along both axes, in ``out[j - j0, i - i0]``.
 
     (i0, j0) is the corner of a block, ``out`` a whole number of blocks. Zero where no block lives.
+    ``room`` (2, 12, 12): to work in.
     """
-    padded = np.empty((SIDE + 4, SIDE + 4))
-    smooth = np.empty((SIDE + 4, SIDE))
+    padded, smooth = room[0], room[1]
     for block_row in range(out.shape[0] >> SHIFT):
         for block_column in range(out.shape[1] >> SHIFT):
             left, low = i0 + block_column * SIDE, j0 + block_row * SIDE
@@ -113,7 +113,8 @@ def field_of(cell_map: CellMap, short_term: float, i0: int, j0: int, field: Byte
     """``field``, which is all 0, filled with smoothed activities from cell (i0, j0) on, which
     begins a block."""
     sigma = cell_map.config.frontend.sigma_cells
-    _field(cell_map.cells, short_term, i0, j0, _kernel(sigma), field)
+    room = np.empty((2, SIDE + 4, SIDE + 4))
+    _field(cell_map.cells, short_term, i0, j0, _kernel(sigma), field, room)
     return field
 
 

@@ -3,6 +3,7 @@
 
 import math
 from dataclasses import dataclass, replace
+from itertools import accumulate
 
 import numpy as np
 
@@ -110,11 +111,11 @@ class Standing:
         )
         counts = [len(one.points_map) for one in kept]
         asked = Asked(
-            lasers=np.array([one.T_map_laser for one in kept]),
-            limits=np.array([one.limit for one in kept]),
+            lasers=np.concatenate([one.T_map_laser for one in kept]).reshape(-1, 3),
+            limits=np.concatenate([one.limit for one in kept]).reshape(len(kept), -1),
             ages=np.array([(stamp_ns - one.stamp_ns) / NS_PER_S for one in kept]),
             points=np.concatenate([one.points_map for one in kept]),
-            ends=np.cumsum(counts),
+            ends=np.array(list(accumulate(counts))),
         )
         now = Present(
             points=points,

@@ -12,7 +12,7 @@ from slam._jit import inner, njit
 from slam.arrays import Float
 from slam.frontend.odometry_prior import inverse
 
-WHOLE = [0, 1, 2, 1, 3, 4, 2, 4, 5]  # places in the upper triangle, of all nine
+WHOLE = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])  # places in the upper triangle, of all nine
 
 
 def whole(upper: Float) -> Float:
