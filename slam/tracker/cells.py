@@ -111,7 +111,7 @@ def stamped(before: int, weight: float, sure: float, now: int) -> int:
 
 
 @inlined
-def lasting(y: float, age: float, known_s: float) -> float:
+def lasting(y: Any, age: Any, known_s: float) -> Any:
     """w of ``Look``: the long-known part of a trace."""
     return y * age / (age + known_s)
 
@@ -120,7 +120,7 @@ def lasting(y: float, age: float, known_s: float) -> float:
 def activity(cells: Cells | Field, short_term: float, slot: int, j: int, i: int) -> float:
     """v = y + (1 - y) short_term x of a cell of a block: what observations are matched to."""
     x, y = cells.x[slot, j, i], cells.y[slot, j, i]
-    return y + (1.0 - y) * short_term * x
+    return float(y + (1.0 - y) * short_term * x)
 
 
 @inlined

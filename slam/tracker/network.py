@@ -161,7 +161,8 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
                         cells.age[slot, jj, ii] = age
                         if faced != 0 or y == 0.0:
                             cells.facing[slot, jj, ii] = faced
-                    alive |= x > 0.0 or y > 0.0
+                    if x > 0.0 or y > 0.0:
+                        alive = True
             if write and not alive:
                 dies(cells, row, column)
     if write:

@@ -9,7 +9,8 @@ from typing import Any, NamedTuple
 from slam._jit import inner, uncounted
 from slam.arrays import Float
 from slam.frontend.odometry_prior import inverse, turn
-from slam.tracker.matching.score import Field, Reward, Seen, evaluated
+from slam.tracker.cells import Field
+from slam.tracker.matching.score import Reward, Seen, evaluated
 
 SCRATCH = (19, 3)  # shape of the room that a climb works in: of ``refine``, and two matrices
 

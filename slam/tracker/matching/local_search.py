@@ -183,7 +183,7 @@ def search(  # noqa: PLR0913 (arrays of one problem)
     chosen = np.ascontiguousarray(points[::every])
     step = heading_step(chosen, config.heading_cells * cell, cell, config)
     half = math.ceil(window.turn_rad / step)
-    turns = np.arange(-half, half + 1) * step
+    turns = np.arange(-half, half + 1, dtype=np.float64) * step
     reach = math.ceil(window.reach_m / cell)
     bases = np.empty((len(turns), len(chosen), 2), np.int32)
     place(chosen, prediction, turns, cell, 0, 0, bases)

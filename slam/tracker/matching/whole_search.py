@@ -81,7 +81,7 @@ class WholeSearch:
         coarse = self._coarse
         step = heading_step(self._points, coarse.pitch, coarse.pitch, self._config)
         count = math.ceil(math.tau / step)
-        self._turns: Float = np.arange(count) * (math.tau / count)  # all round
+        self._turns = np.arange(count, dtype=np.float64) * (math.tau / count)  # all round
         self._reach = tuple(math.ceil(0.5 * n) for n in coarse.shape)  # rows, columns
         i0, j0 = (c + coarse.margin for c in coarse.corner)
         rows, columns = coarse.shape
