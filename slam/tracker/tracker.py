@@ -57,9 +57,15 @@ class Tracker(abc.ABC):
         self.reset()
 
     @classmethod
-    @functools.cache
     def _get_ready(cls) -> None:
-        """Compile, the first time in a process: run every kernel once on a little room."""
+        """Compile, the first time in a process; a class without a config of its own as its base."""
+        ours = (kind for kind in cls.__mro__ if issubclass(kind, Tracker))
+        next(kind for kind in ours if "config_class" in vars(kind))._rehearse()
+
+    @classmethod
+    @functools.cache
+    def _rehearse(cls) -> None:
+        """Run every kernel once on a little room."""
         slam = cls.__new__(cls)
         slam.config = cls.config_class(cell_m=0.2, standing=StandingConfig(thin_m=0.0))
         with announced("the SLAM's kernels", warmup.COMPILE_S):

@@ -9,7 +9,7 @@ process where no folder for the cache can be written.
 
 import numpy as np
 
-from slam.frames import NS_PER_S, Features, Frame, LaserSpec, Odometry, Scan
+from slam.frames import NS_PER_S, Frame, LaserSpec, Odometry, Scan
 from slam.frontend.observations import observe
 from slam.posegraph import Edge, optimise
 from slam.tracker.cell_map import CellMap
@@ -24,7 +24,6 @@ from slam.tracker.uncertainty.covariances import carried, observable
 COMPILE_S = 10.0  # of one core of a Xeon, measured
 SPEC = LaserSpec(n_beams=9, angle_min=-1.0, angle_increment=0.25)
 RANGES = np.array([2.0, 2.0, 2.0, 1.0, 3.0, 3.0, 2.0, 2.0, np.inf], np.float32)
-CORNERS = np.array([[2.0, 1.0], [2.0, -1.0], [1.0, 0.5]])
 
 
 def frame(k: int) -> Frame:
@@ -34,9 +33,6 @@ def frame(k: int) -> Frame:
         stamp_ns=stamp_ns,
         odometry=Odometry(stamp_ns=stamp_ns, T_odom_robot=np.zeros(3), increment_covariance=spread),
         scan=Scan(stamp_ns=stamp_ns, ranges=RANGES, spec=SPEC),
-        features=Features(
-            stamp_ns=stamp_ns, points_robot=CORNERS, covariances=np.array(3 * [spread[:2, :2]])
-        ),
     )
 
 
