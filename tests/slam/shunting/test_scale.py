@@ -6,7 +6,7 @@ import numpy as np
 from slam import se2
 from slam.frontend.observations import from_scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.tracker.cells import FREE_COUNT, TOUCHED_COUNT, living
+from slam.tracker.cells import FREE_COUNT, living
 from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from tests.world2d import World2D, arena, frames, laser, office, office_loop, wander
