@@ -10,10 +10,9 @@ By itself Numba optimises each function and makes machine code of it, and again 
 calls it: what is five calls deep is compiled six times, and only the outermost code runs. With
 ``link_once`` a function that no Python calls stays as it was written until its callers have it. The
 code that runs is as fast, and its results are the same: LLVM never reorders floating-point
-arithmetic. What Numba works out again and again for each function is worked out once, too: which
-of its own functions fits types, and which variables live where. This reaches into Numba, so it is
-for the versions that it was tried with; others compile as they do by themselves, which takes
-longer.
+arithmetic. Which of Numba's own functions fits types is worked out once, too. This reaches into
+Numba, so it is for the versions that it was tried with; others compile as they do by themselves,
+which takes half as long again.
 """
 
 import ctypes
@@ -27,7 +26,7 @@ with chdir(os.sep) if Path(".numba_config.yaml").exists() else nullcontext():
     import numba.core.config
 numba.core.config._config_fname = os.devnull  # is no regular file: nothing is read from it
 
-from numba.core import codegen, errors, ir, postproc, transforms, utils  # noqa: E402
+from numba.core import codegen, errors, utils  # noqa: E402
 from numba.core.target_extension import get_local_target  # noqa: E402
 from numba.core.types import functions  # noqa: E402
 
@@ -136,46 +135,9 @@ def _choices(function: Any, context: Any) -> list[tuple[Any, bool]]:
     ]
 
 
-def _list_vars(self: Any, value: Any) -> list[Any]:
-    """As Numba's: the variables in an instruction, the commonest case first."""
-    kind = type(value)
-    if kind is ir.Var:
-        return [value]
-    if kind is dict:
-        value = value.values()
-    elif kind is not list and kind is not tuple:
-        return list(value.list_vars()) if isinstance(value, ir.Inst) else []
-    found = []
-    for one in value:
-        if type(one) is ir.Var:
-            found.append(one)
-        elif type(one) is not str:
-            found += _list_vars(self, one)
-    return found
-
-
-_processed = postproc.PostProcessor.run
-
-
-def _process(self: Any, emit_dels: bool = False, extend_lifetimes: bool = False) -> None:
-    """As Numba's, without the variables of each block, which only code with objects is asked for:
-    lifetimes are found where something reads them, not nine times a function."""
-    code = self.func_ir
-    if code.is_generator:
-        _processed(self, emit_dels, extend_lifetimes)
-        return
-    code.blocks = transforms.canonicalize_cfg(code.blocks)
-    code.variable_lifetime = postproc.VariableLifetime(code.blocks)
-    code.generator_info = None
-    if emit_dels:
-        self._insert_var_dels(extend_lifetimes=extend_lifetimes)
-
-
 def link_once() -> None:
     """Let Numba work so from now on."""
     if numba.version_info.short == TRIED and _plain is not None:
         codegen.JITCPUCodegen._library_class = OnceLinked
         codegen.JITCPUCodegen.set_env = _set_env
         _Function.get_call_type = _call_type
-        ir.Inst._rec_list_vars = _list_vars
-        postproc.PostProcessor.run = _process

@@ -10,17 +10,15 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 from scipy import sparse
 from scipy.sparse.linalg import splu
 
 from slam._jit import inner, uncounted
-from slam.frames import Float
+from slam.arrays import Float, Ints
 
 _SYMMETRIC: Any = {"diag_pivot_thresh": 0.0, "options": {"SymmetricMode": True}}
 LEAST = 1e-9  # 1/m^2, 1/rad^2: added to the diagonal, for poses that nothing holds; set by hand
 LEAK = 1e-6  # edges: the same for the Laplacian, whose pattern alone is used; set by hand
-Ints = NDArray[np.int64]
 
 
 class Pattern:

@@ -14,8 +14,9 @@ from enum import IntEnum
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
+from slam.arrays import Bools, Bytes, Float32, Int32, Ints
+from slam.arrays import Float as Float
 from slam.checked import (
     ByContent,
     covariance,
@@ -30,7 +31,6 @@ from slam.checked import (
 )
 from slam.errors import InvalidValueError
 
-Float = NDArray[np.float64]
 NS_PER_S = 1_000_000_000
 EPOCH = "epoch_ns"  # of ``StreamMetadata.extra``
 MOST_TWIST = 1e3  # m/s and rad/s: faster, de-skewing would tear a scan apart
@@ -165,9 +165,9 @@ class Scan(ByContent):
     """
 
     stamp_ns: int
-    ranges: NDArray[np.float32]
+    ranges: Float32
     spec: LaserSpec
-    intensities: NDArray[np.float32] | None = None
+    intensities: Float32 | None = None
 
     def __post_init__(self) -> None:
         stamp_ns, n = stamp("Scan", self.stamp_ns), self.spec.n_beams
@@ -183,7 +183,7 @@ class Scan(ByContent):
             set_fields(self, intensities=given)
 
     @property
-    def valid(self) -> NDArray[np.bool_]:
+    def valid(self) -> Bools:
         """(n_beams,) True where the range is finite, not 0, and within the scanner's limits."""
         r = self.ranges
         return np.isfinite(r) & (r > 0.0) & (r >= self.spec.range_min) & (r <= self.spec.range_max)
@@ -202,7 +202,7 @@ class Features(ByContent):
     stamp_ns: int
     points_robot: Float
     covariances: Float
-    ids: NDArray[np.int64] | None = None
+    ids: Ints | None = None
 
     def __post_init__(self) -> None:
         stamp_ns = stamp("Features", self.stamp_ns)
@@ -283,11 +283,11 @@ class BeamLabels(ByContent):
     mixed         (n,) bool, the range blends two surfaces
     """
 
-    body: NDArray[np.int32]
-    kind: NDArray[np.uint8]
-    displacement: NDArray[np.float32]
-    incidence: NDArray[np.float32]
-    mixed: NDArray[np.bool_]
+    body: Int32
+    kind: Bytes
+    displacement: Float32
+    incidence: Float32
+    mixed: Bools
 
     def __post_init__(self) -> None:
         n = len(self.body)

@@ -14,6 +14,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import inputs
+from slam.arrays import Bools, Bytes, Float32
 from slam.bounded import bytes_of, text_of
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Raster
@@ -152,7 +153,7 @@ def read_map(yaml: Path, *, saved: bool = False, most_pixels: int = MAX_PIXELS) 
         raise LogFormatError(yaml, str(error)) from error
 
 
-def _meaning(yaml: Path, fields: dict[str, str], mode: str) -> NDArray[np.float32]:
+def _meaning(yaml: Path, fields: dict[str, str], mode: str) -> Float32:
     """Of each gray: (256,) how likely it is occupied, NaN for unknown."""
     grays = np.arange(256)
     if mode == "raw":
@@ -168,7 +169,7 @@ def _meaning(yaml: Path, fields: dict[str, str], mode: str) -> NDArray[np.float3
     return meant.astype(np.float32)
 
 
-def raster_image(raster: Raster) -> NDArray[np.uint8]:
+def raster_image(raster: Raster) -> Bytes:
     """(height, width, 3) RGB picture, highest y on top: free light, solid dark, unknown gray."""
     values = raster.values[::-1].astype(np.float64)
     unknown = np.isnan(values)
@@ -244,9 +245,7 @@ def _sha256(data: bytes) -> str:
     return hashlib.sha256(data).hexdigest()
 
 
-def _read_image(
-    path: Path, image_sum: str | None, most: int
-) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
+def _read_image(path: Path, image_sum: str | None, most: int) -> tuple[Bytes, Bools | None]:
     """Gray values, and which pixels are opaque where the image says so."""
     data = bytes_of(path, most + _MAX_HEADER_BYTES)
     inputs.note(path)
@@ -264,7 +263,7 @@ def _read_image(
     return pixels.reshape(height, width), None
 
 
-def _png(path: Path, data: bytes, most: int) -> tuple[NDArray[np.uint8], NDArray[np.bool_] | None]:
+def _png(path: Path, data: bytes, most: int) -> tuple[Bytes, Bools | None]:
     """The mean of its colours, as a map_server takes it."""
     from PIL import Image, UnidentifiedImageError
 

@@ -16,8 +16,8 @@ import numpy as np
 
 from slam import se2
 from slam._jit import inner, njit
-from slam.block_cholesky import Ints, Pattern, solve
-from slam.frames import Float
+from slam.arrays import Float, Ints
+from slam.block_cholesky import Pattern, solve
 from slam.frontend.odometry_prior import upper_inverted
 
 INLIER = 11.3  # chi squared of 3 degrees of freedom, 99 %

@@ -96,7 +96,7 @@ class Drive:
         self, frame: Frame, observations: Observations, prediction: Prediction, match: Match
     ) -> None:
         slam, numbers, matcher = self._slam, self._numbers, self._slam._matcher
-        if observations.weight < numbers.least_weight:
+        if observations.amount < numbers.least_weight:
             return
         self._new.append((GOES_ON, matcher.usual.share(match, observations), True))
         there = match.T_map_robot
@@ -105,10 +105,10 @@ class Drive:
         if others:
             other = others[self._rng.integers(len(others))]
             at, prior = prediction.T_map_robot, prediction.prior
-            other = slam._standing.with_votes(frame.stamp_ns, at, prior, other)
+            other = slam._standing.weighted(frame.stamp_ns, at, prior, other)
             carried = matcher.match(other, prediction, slam.cell_map)
             self._new.append((GOES_ON, matcher.usual.share(carried, other), False))
-        everyone = observations.with_votes(None)
+        everyone = observations.weighted(None)
         self._seen.append((truth, everyone))
         self._new.append((PLACE, self._explained(everyone, there)[1], True))
         for answer in searched(slam, everyone):

@@ -12,11 +12,10 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from slam.arrays import Bools, Float, Float32, Ints
 from slam.days.evidence import Snapshot
 from slam.days.history import History, dense
-from slam.frames import Float
 
 # What counts as changed between two sessions; all set by hand.
 STANDS = 0.4  # share of the looks that found it: something stands
@@ -109,9 +108,9 @@ def between(before: Snapshot, after: Snapshot, cell_m: float) -> list[Change]:
 
 
 def _pieces(
-    there: NDArray[np.float32],
-    other: NDArray[np.float32],
-    low: NDArray[np.int64],
+    there: Float32,
+    other: Float32,
+    low: Ints,
     cell_m: float,
 ) -> list[_Piece]:
     """What stands in one image where the other is empty, joined to pieces."""
@@ -129,9 +128,7 @@ def _pieces(
     return [piece for piece in pieces if piece.confidence >= LEAST]
 
 
-def _changed(
-    there: NDArray[np.float32], other: NDArray[np.float32], cell_m: float
-) -> NDArray[np.bool_]:
+def _changed(there: Float32, other: Float32, cell_m: float) -> Bools:
     """Where something stands in one image, and in the other nothing does.
 
     Beams pass beside what is thin, as the legs of a chair: it has a small share. That counts where
@@ -145,9 +142,7 @@ def _changed(
     return np.asarray(solid | thin)
 
 
-def _known_around(
-    one: NDArray[np.float32], other: NDArray[np.float32], cells: float
-) -> NDArray[np.float32]:
+def _known_around(one: Float32, other: Float32, cells: float) -> Float32:
     """Share of the places around each that both saw: at the edge of what was seen, edges move."""
     side = 2 * math.floor(cells + 1e-9) + 1
     both = (~np.isnan(one) & ~np.isnan(other)).astype(np.float32)
@@ -175,7 +170,7 @@ def _extent(points: Float, cell_m: float) -> float:
     return float((points.max(axis=0) - points.min(axis=0)).max()) + cell_m
 
 
-def _grown(image: NDArray[np.bool_], cells: float) -> NDArray[np.bool_]:
+def _grown(image: Bools, cells: float) -> Bools:
     n = max(0, math.floor(cells + 1e-9))
     y, x = np.mgrid[-n : n + 1, -n : n + 1]
     disc = (x * x + y * y <= cells * cells + 1e-9).astype(np.uint8)

@@ -10,11 +10,11 @@ from dataclasses import dataclass
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
+from slam.arrays import Bytes, Float, Float32, Int32, Ints
 from slam.errors import InvalidValueError
-from slam.frames import NS_PER_S, Float, Frame
+from slam.frames import NS_PER_S, Frame
 from slam.scan_points import deskewed
 
 CELL_M = 0.1  # m, edge of a place; set by hand
@@ -36,8 +36,8 @@ class Snapshot:
     """
 
     time_s: float
-    cells: NDArray[np.int32]
-    standing: NDArray[np.float32]
+    cells: Int32
+    standing: Float32
 
     def __post_init__(self) -> None:
         if not math.isfinite(self.time_s):
@@ -60,7 +60,7 @@ class SessionGrid:
     ) -> None:
         self._cell_m, self._every_ns = cell_m, round(every_s * NS_PER_S)
         self._least_looks = least_looks
-        self._tiles: dict[tuple[int, int], NDArray[np.float32]] = {}
+        self._tiles: dict[tuple[int, int], Float32] = {}
         self._last_ns: int | None = None
         self.scans = 0
 
@@ -109,9 +109,9 @@ class SessionGrid:
     def _add_to(
         self,
         key: tuple[int, int],
-        low: NDArray[np.int64],
-        taken: NDArray[np.uint8],
-        empty: NDArray[np.uint8],
+        low: Ints,
+        taken: Bytes,
+        empty: Bytes,
     ) -> None:
         tile = self._tiles.get(key)
         if tile is None:

@@ -22,10 +22,10 @@ from itertools import product
 
 import numpy as np
 
+from slam.arrays import Float
 from slam.days.history import History, dense, hour_of
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
-from slam.frames import Float
 
 HOUR_S = 3600.0
 LEAST = 0.01  # no probability is nearer to 0 or 1; set by hand
@@ -103,10 +103,10 @@ class Habits:
         """
         values = self._checked(time_s, values)
         if self.times_s:
-            told = self._by_tempo(time_s)
+            expected = self._by_tempo(time_s)
             known = ~np.isnan(values)
-            lost = values * log_score(told, np.ones(self.n))
-            lost = lost + (1.0 - values) * log_score(told, np.zeros(self.n))
+            lost = values * log_score(expected, np.ones(self.n))
+            lost = lost + (1.0 - values) * log_score(expected, np.zeros(self.n))
             self.scores[:, known] -= lost[:, known]
         self.rows.append(values)
         self.times_s.append(float(time_s))
@@ -143,8 +143,8 @@ class Habits:
 
     def probability(self, time_s: float) -> Float:
         """Mean over the tempos by their weights."""
-        told = (self.weights() * self._by_tempo(time_s)).sum(axis=0)
-        return np.asarray(np.clip(told, LEAST, 1.0 - LEAST))
+        expected = (self.weights() * self._by_tempo(time_s)).sum(axis=0)
+        return np.asarray(np.clip(expected, LEAST, 1.0 - LEAST))
 
     def usual(self, hour: float) -> Float:
         """(n,) what is usual at that hour, whatever was last seen."""
@@ -279,8 +279,8 @@ class MobilityMap:
         near = off <= max(reach_m, 0.7072 * cell)
         if not near.any():
             return None
-        told = self._habits.probability(time_s)
-        return float(told[near].max() if reach_m > 0.0 else told[int(np.argmin(off))])
+        expected = self._habits.probability(time_s)
+        return float(expected[near].max() if reach_m > 0.0 else expected[int(np.argmin(off))])
 
     def _raster(self, values: Float) -> Raster | None:
         cells, _ = self.history.table()

@@ -17,9 +17,10 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
+from slam.arrays import Bools, Float, Float32, Int32, Ints
 from slam.days.evidence import Snapshot
 from slam.errors import InvalidValueError, LogFormatError
-from slam.frames import NS_PER_S, Float, Frame
+from slam.frames import NS_PER_S, Frame
 from slam.scan_points import deskewed
 
 UNSEEN, LEVELS = 0, 254  # bytes of a share: 0 unseen, 1 to 255 for 0 to 1
@@ -66,7 +67,7 @@ class History:
         """(sessions,) when each was."""
         return np.array([s.time_s for s in self.sessions], dtype=np.float64)
 
-    def table(self) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+    def table(self) -> tuple[Int32, Float32]:
         """Places (n, 2) that any session saw, and (sessions, n) shares, NaN where unseen."""
         if not self.sessions:
             return np.zeros((0, 2), np.int32), np.zeros((0, 0), np.float32)
@@ -106,11 +107,7 @@ class History:
 
 
 def _check(
-    path: Path,
-    cell: NDArray[Any],
-    times: NDArray[Any],
-    cells: NDArray[Any],
-    levels: NDArray[Any],
+    path: Path, cell: NDArray[Any], times: NDArray[Any], cells: NDArray[Any], levels: NDArray[Any]
 ) -> None:
     if cell.shape != () or cell.dtype != np.float64 or not 0.0 < float(cell) < math.inf:
         raise LogFormatError(path, "day_cell_m must be a length > 0 m")
@@ -133,9 +130,7 @@ def _check(
         )
 
 
-def dense(
-    cells: NDArray[np.int32], values: Sequence[NDArray[np.float32]] | NDArray[np.float32]
-) -> tuple[NDArray[np.int64], NDArray[np.float32]]:
+def dense(cells: Int32, values: Sequence[Float32] | Float32) -> tuple[Ints, Float32]:
     """Corner (x, y) of the places' rectangle, and (k, height, width) images, NaN elsewhere."""
     rows = np.atleast_2d(np.asarray(values, dtype=np.float32))
     low = cells.min(axis=0).astype(np.int64)
@@ -162,7 +157,7 @@ class News:
         cells, last = _last_seen(history)
         stood = last >= STOOD
         self._low = np.zeros(2, np.int64)
-        self._empty: NDArray[np.bool_] = np.zeros((0, 0), np.bool_)
+        self._empty: Bools = np.zeros((0, 0), np.bool_)
         if len(cells):
             self._low, (image,) = dense(cells, last)
             side = np.ones((2 * SLACK + 1,) * 2, np.uint8)
@@ -170,7 +165,7 @@ class News:
             self._empty = ~np.isnan(image) & (near <= EMPTY)
         self._stood = cells[stood] - self._low
         self._stood_at: Float = np.asarray((cells[stood] + 0.5) * self.cell_m, dtype=np.float64)
-        self._since_ns: NDArray[np.int64] = np.full(self._empty.shape, _NEVER, np.int64)
+        self._since_ns: Ints = np.full(self._empty.shape, _NEVER, np.int64)
 
     @property
     def known(self) -> bool:
@@ -191,18 +186,18 @@ class News:
         since = self._since_ns[places[:, 1], places[:, 0]]
         self._note(places[since == _NEVER], frame.stamp_ns)
         new = frame.stamp_ns - np.minimum(since, frame.stamp_ns) <= NEWS_S * NS_PER_S
-        told = np.zeros(len(ends), np.bool_)
-        told[beams[new]] = True
-        return float(told.mean())
+        is_news = np.zeros(len(ends), np.bool_)
+        is_news[beams[new]] = True
+        return float(is_news.mean())
 
-    def _note(self, places: NDArray[np.int64], now_ns: int) -> None:
+    def _note(self, places: Ints, now_ns: int) -> None:
         """From now on these places are news, and those so near that they are of one thing."""
         for i, j in places.tolist():
             rows, columns = (slice(max(at - REACH, 0), at + REACH + 1) for at in (j, i))
             around = self._since_ns[rows, columns]
             np.minimum(around, now_ns, out=around)
 
-    def _came(self, ends: Float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _came(self, ends: Float) -> tuple[Ints, Ints]:
         """Returns (n,) that lie where nothing was, and their places (n, 2)."""
         at = np.floor(ends / self.cell_m).astype(np.int64) - self._low
         height, width = self._empty.shape
@@ -210,7 +205,7 @@ class News:
         new = inside[self._empty[at[inside, 1], at[inside, 0]]]
         return new, at[new]
 
-    def _went(self, eye: Float, ends: Float) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _went(self, eye: Float, ends: Float) -> tuple[Ints, Ints]:
         """Beams (n,) that pass through a place where something stood, and those places (n, 2)."""
         away = ends - eye
         bearings = np.arctan2(away[:, 1], away[:, 0])
@@ -235,7 +230,7 @@ class News:
         return np.concatenate(beams), np.concatenate(places)
 
 
-def _last_seen(history: History) -> tuple[NDArray[np.int32], NDArray[np.float32]]:
+def _last_seen(history: History) -> tuple[Int32, Float32]:
     """Places (n, 2), and the share of each when a session saw it last."""
     cells, values = history.table()
     last = np.full(len(cells), np.nan, np.float32)

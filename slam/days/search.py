@@ -18,13 +18,13 @@ from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
+from slam.arrays import Float, Float32
 from slam.days.evidence import EVERY_S, RANGE_M, SessionGrid, Snapshot
 from slam.days.history import History, dense
 from slam.estimate import Estimate
-from slam.frames import NS_PER_S, Float, Frame, to_s
+from slam.frames import NS_PER_S, Frame, to_s
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction
 from slam.tracker.belief.likelihood import probabilities
@@ -114,7 +114,7 @@ class Past:
             )
 
 
-def _highest_near(image: NDArray[np.float32], slack: int) -> NDArray[np.float32]:
+def _highest_near(image: Float32, slack: int) -> Float32:
     """The largest share within ``slack`` places along both axes, 0 where nothing is known."""
     if not image.size:
         return image
@@ -254,8 +254,7 @@ class StartSearch:
             for one in now:
                 at = se2.compose(late.T_map_own, one.T_own_robot)
                 match = self._known.matched(one.observations, at, covariance)
-                told = late.place.told + KEPT_ANEW * self._places.told(match)
-                late.place = replace(late.place, told=told, anew=late.place.anew + KEPT_ANEW)
+                late.place = late.place.asked_again(KEPT_ANEW, self._places.evidence(match))
             if not late.unasked:
                 self._late.pop(0)
                 self._weigh(late, pose)

@@ -14,13 +14,14 @@ from pathlib import Path
 import numpy as np
 
 from slam import se2
+from slam.arrays import Float
 from slam.days.evidence import CELL_M, EVERY_S, SessionGrid
 from slam.days.habits import DaysRaster, MobilityMap
 from slam.days.history import NAMES, History, News
 from slam.days.search import FITS, KNOWN, SPOILS, Agreement, Past, StartSearch
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Changes, Estimate, Raster
-from slam.frames import Float, Frame, to_s
+from slam.frames import Frame, to_s
 from slam.path import PosePath
 from slam.tracker import map_file
 from slam.tracker.belief.places import coarse
@@ -62,12 +63,7 @@ class Session:
     cells_hold = "activities"
 
     def __init__(
-        self,
-        tracker: Tracker,
-        *,
-        time_s: float,
-        history: History | None = None,
-        found: bool = True,
+        self, tracker: Tracker, *, time_s: float, history: History | None = None, found: bool = True
     ) -> None:
         if not math.isfinite(time_s):
             raise InvalidValueError(f"Session.time_s must be finite, got {time_s}")
@@ -95,7 +91,7 @@ class Session:
         """Forget this session; a map that was already written to cannot be taken back."""
         self._grid = SessionGrid(self.history.cell_m)
         self._past = Past(self.history)
-        self._news, self._told = News(self.history), 0.0
+        self._news, self._news_share = News(self.history), 0.0
         self._asked_ns: int | None = None
         self._search = None if self._new else StartSearch(self.tracker, self._past)
         self._path, self._T_map_own = PosePath(), np.zeros(3)
@@ -150,23 +146,23 @@ class Session:
             give_up_s = self.tracker.config.tracking.give_up_s
             self._gave_up |= self._lost_s > give_up_s
         self._before_ns = frame.stamp_ns
-        told = self._told_by(frame, estimate)
+        reported = self._with_news(frame, estimate)
         if estimate.converged:
             self._grid.add(frame, estimate.T_map_robot)
         self._path.add(frame.stamp_ns, estimate.T_map_robot)
-        return told
+        return reported
 
-    def _told_by(self, frame: Frame, estimate: Estimate) -> Estimate:
+    def _with_news(self, frame: Frame, estimate: Estimate) -> Estimate:
         """The estimate with what of the scan is news; asked as often as scans are counted."""
         if not self._news.known:
             return estimate
         if not estimate.converged:
-            self._told = 0.0
+            self._news_share = 0.0
         elif self._asked_ns is None or to_s(frame.stamp_ns - self._asked_ns) >= EVERY_S:
-            self._told = self._news.share(frame, estimate.T_map_robot)
+            self._news_share = self._news.share(frame, estimate.T_map_robot)
             self._asked_ns = frame.stamp_ns
-        found = {**estimate.diagnostics, "news": self._told}
-        if self._state == State.TRACKING and self._told >= OUTDATED:
+        found = {**estimate.diagnostics, "news": self._news_share}
+        if self._state == State.TRACKING and self._news_share >= OUTDATED:
             found["state"] = State.OUTDATED.value
         return replace(estimate, diagnostics=found)
 

@@ -12,23 +12,23 @@ seeing something else there. At zero the object goes.
 
 import math
 from collections.abc import Callable, Mapping
-from dataclasses import dataclass
 from typing import Any, ClassVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
+from slam.arrays import Bools, Float, Ints
 from slam.ekf.config import EkfConfig
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate, Landmarks
-from slam.frames import Features, Float, Frame, Odometry, Scan
+from slam.frames import Features, Frame, Odometry, Scan
 from slam.frontend import odometry_prior
 from slam.frontend.corners import answered, corners
 from slam.frontend.odometry_prior import assumed_covariance
 from slam.frontend.polar import hidden, polar
 from slam.landmarks.association import METHODS
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
+from slam.landmarks.hypotheses import Association
 from slam.path import OnPath, PosePath
 
 CHANCE = 0.05  # probability of something else where a landmark was; set by hand
@@ -54,13 +54,13 @@ class Lifecycle:
         self._seen_adds = math.log(config.detection / CHANCE)
         self._missed_adds = math.log((1.0 - config.detection) / (1.0 - CHANCE))
         self._next_key = 0
-        self.keys: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
-        self.looks: NDArray[np.int64] = np.zeros(0, dtype=np.int64)
+        self.keys: Ints = np.zeros(0, dtype=np.int64)
+        self.looks: Ints = np.zeros(0, dtype=np.int64)
         self.existence: Float = np.zeros(0)
         self.deleted = 0
 
     @property
-    def confirmed(self) -> NDArray[np.bool_]:
+    def confirmed(self) -> Bools:
         """(n,) bool: seen often enough to be a landmark."""
         return self.looks >= self._config.confirm_looks
 
@@ -73,10 +73,10 @@ class Lifecycle:
 
     def judge(
         self,
-        seen: NDArray[np.int64],
-        expected: NDArray[np.bool_],
-        left_behind: NDArray[np.bool_],
-    ) -> NDArray[np.int64]:
+        seen: Ints,
+        expected: Bools,
+        left_behind: Bools,
+    ) -> Ints:
         """Count one frame; the indices that can go.
 
         expected     (n,) should have been seen
@@ -92,7 +92,7 @@ class Lifecycle:
         self.existence = np.minimum(self.existence, ceiling)
         return np.flatnonzero((self.existence <= 0.0) | (left_behind & ~self.confirmed))
 
-    def remove(self, gone: NDArray[np.int64]) -> None:
+    def remove(self, gone: Ints) -> None:
         """Forget these; counts how many of them were confirmed."""
         self.deleted += int(self.confirmed[gone].sum())
         self.keys = np.delete(self.keys, gone)
@@ -100,17 +100,15 @@ class Lifecycle:
         self.existence = np.delete(self.existence, gone)
 
 
-def in_view(landmarks_robot: Float, config: EkfConfig, rim: float = WITHIN) -> NDArray[np.bool_]:
+def in_view(landmarks_robot: Float, config: EkfConfig, rim: float = WITHIN) -> Bools:
     """(n,) landmarks (n, 2), robot frame, within the share ``rim`` of range and field of view."""
     distance, bearing = polar(landmarks_robot)
     half = math.radians(config.fov_deg) / 2.0
-    inside: NDArray[np.bool_] = (np.abs(bearing) < rim * half) | (config.fov_deg >= 360.0)
+    inside: Bools = (np.abs(bearing) < rim * half) | (config.fov_deg >= 360.0)
     return inside & (distance < rim * config.range_m)
 
 
-def unhidden_by_features(
-    landmarks_robot: Float, points_robot: Float, config: EkfConfig
-) -> NDArray[np.bool_]:
+def unhidden_by_features(landmarks_robot: Float, points_robot: Float, config: EkfConfig) -> Bools:
     """(n,) False where an observed thing stands before the landmark: within the angle that
     ``occluder_m`` fills at its distance, and nearer than the landmark by as much."""
     if config.occluder_m == 0.0:
@@ -118,7 +116,7 @@ def unhidden_by_features(
     return ~hidden(landmarks_robot, points_robot, config.occluder_m)
 
 
-def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
+def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> Bools:
     """(n,) True where every beam at the landmark (laser frame) passes beyond it: it is gone.
 
     A beam that ends before it says that it is hidden; one that ends at it, that something is there
@@ -139,20 +137,6 @@ def unhidden_by_beams(landmarks_laser: Float, scan: Scan) -> NDArray[np.bool_]:
 PRESETS: dict[str, Callable[..., EkfConfig]] = {
     name: getattr(EkfConfig, name) for name in EkfConfig.presets
 }
-
-
-@dataclass(frozen=True, kw_only=True, eq=False)
-class _Pairs:
-    """``landmarks`` (k,) the landmark of each point or -1; ``plausible`` (k,) whether one is near
-    enough to explain it, taken or not."""
-
-    landmarks: NDArray[np.int64]
-    plausible: NDArray[np.bool_]
-
-    @property
-    def matched(self) -> int:
-        """Number of pairs."""
-        return int((self.landmarks >= 0).sum())
 
 
 class EkfSlam(OnPath):
@@ -251,10 +235,10 @@ class EkfSlam(OnPath):
             self.filter.predict(increment, covariance)
         self._before = odometry
 
-    def _correct(self, points: Float, covariances: Float, confirmed: NDArray[np.bool_]) -> _Pairs:
+    def _correct(self, points: Float, covariances: Float, confirmed: Bools) -> Association:
         """Pair points with confirmed landmarks, then with candidates; update with each."""
         landmarks = np.full(len(points), -1)
-        plausible = np.zeros(len(points), dtype=np.bool_)
+        plausible, cost = np.zeros(len(points), dtype=np.bool_), 0.0
         for stage in (confirmed, ~confirmed):
             chosen = np.flatnonzero(stage)
             near = chosen[self._within_reach(chosen)]
@@ -265,20 +249,21 @@ class EkfSlam(OnPath):
             found = method(self.filter, near, points[free], covariances[free], self._gates)
             landmarks[free] = found.landmarks
             plausible[free] |= found.plausible
+            cost += found.cost
             pairs = free[found.landmarks >= 0]
             self.filter.update(landmarks[pairs], points[pairs], covariances[pairs])
-        return _Pairs(landmarks=landmarks, plausible=plausible)
+        return Association(landmarks=landmarks, cost=cost, plausible=plausible)
 
-    def _within_reach(self, chosen: NDArray[np.int64]) -> NDArray[np.bool_]:
+    def _within_reach(self, chosen: Ints) -> Bools:
         """What could be seen if the pose is off by three standard deviations."""
         P = self.filter.pose_covariance()
         reach = self.config.range_m * (1.0 + REACH_SIGMAS * math.sqrt(max(P[2, 2], 0.0)))
         reach += REACH_SIGMAS * math.sqrt(max(P[0, 0] + P[1, 1], 0.0))
         away = self.filter.landmarks[chosen] - self.filter.pose[:2]
-        near: NDArray[np.bool_] = polar(away)[0] < reach
+        near: Bools = polar(away)[0] < reach
         return near
 
-    def _expected(self, frame: Frame, points: Float) -> NDArray[np.bool_]:
+    def _expected(self, frame: Frame, points: Float) -> Bools:
         """(n,) which landmarks this frame should show."""
         T_robot_map = se2.inverse(self.filter.pose)
         landmarks_robot = se2.transform(T_robot_map, self.filter.landmarks)
@@ -289,9 +274,7 @@ class EkfSlam(OnPath):
             return expected & unhidden_by_beams(landmarks_laser, frame.scan)
         return expected & unhidden_by_features(landmarks_robot, points, self.config)
 
-    def _judge(
-        self, pairs: _Pairs, expected: NDArray[np.bool_], confirmed: NDArray[np.bool_]
-    ) -> None:
+    def _judge(self, pairs: Association, expected: Bools, confirmed: Bools) -> None:
         """Count frames in which nothing expected was met; delete what is gone or left behind."""
         if pairs.matched:
             self._unmatched = 0

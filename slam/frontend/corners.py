@@ -12,13 +12,11 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frames import Features, Float, Scan
+from slam.arrays import Bools, Float
+from slam.frames import Features, Scan
 from slam.frontend.deskew import end_points
-
-Bools = NDArray[np.bool_]
 
 CELL_M = 0.04  # m, edge of a pixel of the image into which a scan is drawn
 RANGE_M = 12.0  # m; returns beyond are not drawn
@@ -196,9 +194,7 @@ def _points(scan: Scan, twist: Float | None) -> Float:
     return end_points(ranges, spec.angles, spec.beam_time_offsets, spec.T_robot_laser, still)
 
 
-def _judge_ends(
-    ranges: Float, valid: NDArray[np.bool_], joined: NDArray[np.bool_]
-) -> tuple[NDArray[np.bool_], NDArray[np.bool_]]:
+def _judge_ends(ranges: Float, valid: Bools, joined: Bools) -> tuple[Bools, Bools]:
     """Points worth drawing, and which of them are ends that are not where a surface ends.
 
     A lone point whose range lies between its neighbours' is a mixed pixel. An end is false where
@@ -221,14 +217,14 @@ def _judge_ends(
     return kept, kept & false_end
 
 
-def _beside(joined: NDArray[np.bool_], these: NDArray[np.bool_]) -> NDArray[np.bool_]:
+def _beside(joined: Bools, these: Bools) -> Bools:
     """Points joined to one of ``these``."""
-    out: NDArray[np.bool_] = joined & np.append(these[1:], False)
+    out: Bools = joined & np.append(these[1:], False)
     out[1:] |= joined[:-1] & these[:-1]
     return out
 
 
-def _flat(points: Float, scan: Scan, joined: NDArray[np.bool_], least: float) -> NDArray[np.bool_]:
+def _flat(points: Float, scan: Scan, joined: Bools, least: float) -> Bools:
     """Ends of surfaces seen so flat that the next beam may hit the same one far behind."""
     n = len(points)
     index = np.arange(n)
@@ -238,15 +234,15 @@ def _flat(points: Float, scan: Scan, joined: NDArray[np.bool_], least: float) ->
     beams = points - scan.spec.T_robot_laser[:2]
     cross = np.abs(along[:, 0] * beams[:, 1] - along[:, 1] * beams[:, 0])
     dot = np.abs((along * beams).sum(axis=1))
-    flat: NDArray[np.bool_] = (to_previous ^ joined) & (cross < math.tan(least) * dot)
+    flat: Bools = (to_previous ^ joined) & (cross < math.tan(least) * dot)
     return flat
 
 
 def _draw(
     points: Float,
     ranges: Float,
-    valid: NDArray[np.bool_],
-    joined: NDArray[np.bool_],
+    valid: Bools,
+    joined: Bools,
     step: float,
 ) -> tuple[Float, Float, Float]:
     """The image, the width of its lines (cells), and the point (2,) m of its pixel (0, 0)."""
@@ -277,7 +273,7 @@ def _peaks(image: Float) -> list[tuple[int, int]]:
     return [(int(columns[k]), int(rows[k])) for k in order]
 
 
-def _misleads(point: Float, beam: int, points: Float, false_ends: NDArray[np.bool_]) -> bool:
+def _misleads(point: Float, beam: int, points: Float, false_ends: Bools) -> bool:
     """Nothing was measured there, or a false end was."""
     reach = WINDOW * CELL_M
     if ((points[beam] - point) ** 2).sum() > reach * reach:
@@ -286,7 +282,7 @@ def _misleads(point: Float, beam: int, points: Float, false_ends: NDArray[np.boo
     return bool((away < reach * reach).any())
 
 
-def _gap(beam: int, points: Float, joined: NDArray[np.bool_], across_m: float) -> Float:
+def _gap(beam: int, points: Float, joined: Bools, across_m: float) -> Float:
     """(2,) m along the surface to its next point, or across the beam where it has none."""
     before = points[beam] - points[beam - 1] if beam > 0 and joined[beam - 1] else None
     after = points[beam + 1] - points[beam] if joined[beam] else None

@@ -4,11 +4,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-
-Float = NDArray[np.float64]
+from slam.arrays import Float
 
 
 @inner

@@ -10,7 +10,7 @@ import numpy as np
 
 from slam import se2
 from slam._jit import inner, uncounted
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.config import FRONTEND, BiasConfig
 
 # Set by hand.
@@ -63,7 +63,7 @@ class HeadingBias:
 @uncounted
 def _learnt(  # noqa: PLR0913 (kernel)
     P: Float, along: float, turning: float, said: float, given: float, grown_m: float,
-    grown_rad: float, share: float, off: float, information: Float,
+    grown_rad: float, share: float, off: float, information: Float
 ) -> tuple[float, float]:  # fmt: skip
     """By how much a match lowers the biases; P (3, 3), their covariance, goes on as ``learn`` and
     its arguments say."""

@@ -6,7 +6,7 @@ for a few numbers each.
 import math
 
 from slam._jit import inner, uncounted
-from slam.frames import Float
+from slam.arrays import Float
 
 Triple = tuple[float, float, float]
 

@@ -10,11 +10,11 @@ from functools import cached_property
 from typing import Any, Protocol
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
+from slam.arrays import Bools, Bytes, Float, Float32, Ints
 from slam.errors import InvalidValueError
-from slam.frames import Features, Float, Frame, Scan
+from slam.frames import Features, Frame, Scan
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.deskew import deskewed
 from slam.frontend.surfaces import NEAR_CELLS, face, follow_ends, join, unmixed
@@ -61,7 +61,7 @@ class Observations:
 
     points_robot  (n, 2) m
     covariances   (n, 3) m^2: xx, xy, yy; at least (0.8 cell)^2 along every axis
-    weights       (n,) share of a full observation
+    shares       (n,) share of a full observation
     tangents      (n, 2) unit direction of the surface where it goes on both ways, or may; else 0
     joined        (n,) bool: the surface goes on to the next point. Without it the dots of a wall
                   seen at a grazing angle match themselves where the robot stood before
@@ -69,58 +69,58 @@ class Observations:
     view          what is seen to be empty
     T_robot_laser (3,) origin of ``view``
     sensor_sigma_m  standard deviation of a range: the scanner's own, or that of the config
-    votes         (n,) weights in [0, 1] on what is young in the map (``tracker.standing``); None: 1
+    weights       (n,) in [0, 1], of returns where the map is young (``tracker.standing``); None: 1
     in_view       share of the returns whose places scans of the last seconds had in view
     """
 
     points_robot: Float
     covariances: Float
-    weights: Float
+    shares: Float
     tangents: Float
-    joined: NDArray[np.bool_]
-    facings: NDArray[np.uint8]
+    joined: Bools
+    facings: Bytes
     view: View
     T_robot_laser: Float
     sensor_sigma_m: float = FRONTEND.sensor_sigma_m
-    votes: Float | None = None
+    weights: Float | None = None
     in_view: float = 1.0
 
     @cached_property
-    def weight(self) -> float:
-        """Sum of the weights."""
-        return float(np.add.reduce(self.weights))  # as ``sum``, at two thirds of its time
+    def amount(self) -> float:
+        """Sum of the shares."""
+        return float(np.add.reduce(self.shares))  # as ``sum``, at two thirds of its time
 
     @cached_property
-    def mean_vote(self) -> float:
+    def mean_weight(self) -> float:
         """Mean weight of the returns, 1 where nothing is known of them."""
-        votes = self.votes
-        if votes is None or not len(votes):
+        weights = self.weights
+        if weights is None or not len(weights):
             return 1.0
-        return float(np.add.reduce(votes)) / len(votes)  # as ``mean``, at a third of its time
+        return float(np.add.reduce(weights)) / len(weights)  # as ``mean``, at a third of its time
 
-    def with_votes(self, votes: Float | None, in_view: float | None = None) -> "Observations":
+    def weighted(self, weights: Float | None, in_view: float | None = None) -> "Observations":
         """The same with other weights, and ``in_view`` unless None: ``replace`` at a quarter of its
         time.
         """
         other = object.__new__(type(self))
         stays = self.in_view if in_view is None else in_view
-        other.__dict__.update(self.__dict__, votes=votes, in_view=stays)
-        other.__dict__.pop("mean_vote", None)
+        other.__dict__.update(self.__dict__, weights=weights, in_view=stays)
+        other.__dict__.pop("mean_weight", None)
         return other
 
 
 @inner
 def _scanned(  # noqa: PLR0913 (kernel)
-    ranges: NDArray[np.float32],
-    angles: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    twist: NDArray[np.float64],
+    ranges: Float32,
+    angles: Float,
+    offsets: Float,
+    T_robot_laser: Float,
+    twist: Float,
     limits: tuple[float, float, float, float],
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    bearings: NDArray[np.float64],
-    free: NDArray[np.float64],
+    points: Float,
+    beams: Ints,
+    bearings: Float,
+    free: Float,
 ) -> tuple[int, bool]:
     """End points in the robot frame of the stamp; bearings and free ranges about that laser.
 
@@ -157,12 +157,7 @@ def _scanned(  # noqa: PLR0913 (kernel)
 
 @inner
 def _cleared(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    origin: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    tangents: NDArray[np.float64],
-    clear: NDArray[np.uint8],
+    points: Float, beams: Ints, origin: Float, joined: Bools, tangents: Float, clear: Bytes
 ) -> int:
     """Move the hits that are no mixed pixel to the front; how many there are. ``clear``: room."""
     count = unmixed(points, beams, origin, joined, clear)
@@ -178,17 +173,17 @@ def _cleared(
 
 @inner
 def _surveyed(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    origin: NDArray[np.float64],
+    points: Float,
+    beams: Ints,
+    origin: Float,
     near: float,
     sweep: tuple[float, int, float],
     variance: float,
-    joined: NDArray[np.bool_],
-    tangents: NDArray[np.float64],
-    facings: NDArray[np.uint8],
-    covariances: NDArray[np.float64],
-    weights: NDArray[np.float64],
+    joined: Bools,
+    tangents: Float,
+    facings: Bytes,
+    covariances: Float,
+    shares: Float,
 ) -> int:
     """Surfaces through the hits; those that remain are moved to the front, and their number.
 
@@ -202,14 +197,12 @@ def _surveyed(  # noqa: PLR0913 (kernel)
         covariances[k, 0], covariances[k, 1], covariances[k, 2] = variance, 0.0, variance
         x, y = points[k, 0], points[k, 1]
         share = math.sqrt(x * x + y * y) * sweep[0] / SPACING_M
-        weights[k] = min(max(share, LEAST_WEIGHT), 1.0)
+        shares[k] = min(max(share, LEAST_WEIGHT), 1.0)
     return count
 
 
 @inner
-def _order(
-    bearings: NDArray[np.float64], order: NDArray[np.int64], room: NDArray[np.int64]
-) -> None:
+def _order(bearings: Float, order: Ints, room: Ints) -> None:
     """Fill ``order`` with the beams by rising bearing, equal ones by number: a merge sort, which
     copies what is in order already, as most of a scan is."""
     n, width = len(order), 1
@@ -235,12 +228,12 @@ def _order(
 
 @inner
 def _by_bearing(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    bearings: NDArray[np.float64],
-    order: NDArray[np.int64],
-    place: NDArray[np.int64],
-    room: NDArray[np.float64],
+    points: Float,
+    beams: Ints,
+    bearings: Float,
+    order: Ints,
+    place: Ints,
+    room: Float,
 ) -> None:
     """Of an interlaced scanner that turns: neighbours are those by bearing, not by number.
 
@@ -261,25 +254,25 @@ def _by_bearing(
 
 @uncounted
 def _observed(  # noqa: PLR0913 (kernel)
-    ranges: NDArray[np.float32],
-    angles: NDArray[np.float64],
-    offsets: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    twist: NDArray[np.float64],
+    ranges: Float32,
+    angles: Float,
+    offsets: Float,
+    T_robot_laser: Float,
+    twist: Float,
     limits: tuple[float, float, float, float],
     sweep: tuple[float, int, float],
     near: float,
     variance: float,
     interlaced: bool,
-    points: NDArray[np.float64],
-    tangents: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    facings: NDArray[np.uint8],
-    bins: NDArray[np.float64],
-    room: NDArray[np.float64],
-    beams: NDArray[np.int64],
+    points: Float,
+    tangents: Float,
+    covariances: Float,
+    shares: Float,
+    joined: Bools,
+    facings: Bytes,
+    bins: Float,
+    room: Float,
+    beams: Ints,
 ) -> tuple[int, float]:
     """All that one scan shows: how many points there are, and the longest free range.
 
@@ -297,7 +290,7 @@ def _observed(  # noqa: PLR0913 (kernel)
         _by_bearing(points[:count], beams[0, :count], bearings, beams[1], beams[2], tangents)
     left = _surveyed(
         points[:count], beams[0, :count], T_robot_laser, near, sweep, variance,
-        joined[:count], tangents[:count], facings[:count], covariances, weights,
+        joined[:count], tangents[:count], facings[:count], covariances, shares,
     )  # fmt: skip
     return left, fill(bearings, free, math.tau / bins.shape[1], bins[0], bins[1], room[2])
 
@@ -319,7 +312,7 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
     use = min(grain.range_m, spec.range_max)
     sensor_sigma_m = spec.range_sigma_m or config.sensor_sigma_m
     points, tangents = np.empty((n, 2)), np.empty((n, 2))
-    covariances, weights = np.empty((n, 3)), np.empty(n)
+    covariances, shares = np.empty((n, 3)), np.empty(n)
     joined, facings = np.empty(n, np.bool_), np.empty(n, np.uint8)
     bins = np.empty((2, n_bins(spec.angle_increment)))
     left, farthest = _observed(
@@ -328,13 +321,13 @@ def from_scan(scan: Scan, twist: Float, grain: Grain) -> Observations:
         (spec.range_min, spec.range_max, use, min(use, SILENT_M)),
         (spec.angle_increment, n, use), NEAR_CELLS * grain.cell_m,
         max(config.sigma_cells * grain.cell_m, sensor_sigma_m) ** 2, spec.sweep_duration > 0.0,
-        points, tangents, covariances, weights, joined, facings, bins,
+        points, tangents, covariances, shares, joined, facings, bins,
         np.empty((3, max(n, bins.shape[1]))), np.empty((3, n), np.int64),
     )  # fmt: skip
     return Observations(
         points_robot=points[:left],
         covariances=covariances[:left],
-        weights=weights[:left],
+        shares=shares[:left],
         tangents=tangents[:left],
         joined=joined[:left],
         facings=facings[:left],
@@ -360,7 +353,7 @@ def from_features(features: Features, grain: Grain) -> Observations:
     return Observations(
         points_robot=points[near].copy(),
         covariances=covariances,
-        weights=np.ones(len(covariances)),
+        shares=np.ones(len(covariances)),
         tangents=np.zeros((len(covariances), 2)),
         joined=np.zeros(len(covariances), np.bool_),
         facings=np.zeros(len(covariances), np.uint8),
@@ -387,7 +380,7 @@ def observe(frame: Frame, twist: Float, grain: Grain) -> Observations:
 
 def joined(first: Observations, second: Observations) -> Observations:
     """Both, seen with the view of the first."""
-    by_point = ("points_robot", "covariances", "weights", "tangents", "joined", "facings")
+    by_point = ("points_robot", "covariances", "shares", "tangents", "joined", "facings")
     both: dict[str, Any] = {
         n: np.concatenate([getattr(first, n), getattr(second, n)]) for n in by_point
     }

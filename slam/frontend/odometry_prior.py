@@ -10,8 +10,9 @@ import numpy as np
 
 from slam import se2
 from slam._jit import inner, uncounted
+from slam.arrays import Float
 from slam.errors import InvalidValueError
-from slam.frames import MOST_TWIST, Float, Odometry
+from slam.frames import MOST_TWIST, Odometry
 from slam.frontend.heading_bias import HeadingBias
 from slam.frontend.motions import chained
 
@@ -39,18 +40,28 @@ NO_SLIP: Float = np.zeros((3, 3))
 SINGULAR = 1e-12
 
 
+def rotated(c: float, s: float, xx: float, xy: float, yy: float) -> tuple[float, float, float]:
+    """A covariance [[xx, xy], [xy, yy]] turned by the angle of cosine c and sine s, like that."""
+    return (
+        c * c * xx - 2.0 * c * s * xy + s * s * yy,
+        c * s * (xx - yy) + (c * c - s * s) * xy,
+        s * s * xx + 2.0 * c * s * xy + c * c * yy,
+    )
+
+
+rotate = inner(rotated)  # in kernels
+
+
 @inner
 def turn(covariance: Float, theta: float, out: Float) -> None:
     """As ``turned``, into ``out``."""
     c, s = math.cos(theta), math.sin(theta)
-    xx, xy, xt = covariance[0, 0], covariance[0, 1], covariance[0, 2]
-    yy, yt = covariance[1, 1], covariance[1, 2]
-    out[0, 0] = c * c * xx - 2.0 * c * s * xy + s * s * yy
-    out[0, 1] = out[1, 0] = c * s * (xx - yy) + (c * c - s * s) * xy
-    out[1, 1] = s * s * xx + 2.0 * c * s * xy + c * c * yy
+    a, b, d = rotate(c, s, covariance[0, 0], covariance[0, 1], covariance[1, 1])
+    xt, yt = covariance[0, 2], covariance[1, 2]
+    out[0, 0], out[1, 1], out[2, 2] = a, d, covariance[2, 2]
+    out[0, 1] = out[1, 0] = b
     out[0, 2] = out[2, 0] = c * xt - s * yt
     out[1, 2] = out[2, 1] = s * xt + c * yt
-    out[2, 2] = covariance[2, 2]
 
 
 @uncounted
@@ -65,6 +76,7 @@ def turned(covariance: Float, theta: float) -> Float:
     return out
 
 
+@uncounted
 def upper_inverted(
     a: float, b: float, c: float, d: float, e: float, f: float
 ) -> tuple[float, float, float, float, float, float]:
@@ -73,7 +85,7 @@ def upper_inverted(
     bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
     det = a * aa + b * ab + c * ac
     if det <= 0.0:
-        x, y, t = (1.0 / max(v, SINGULAR) for v in (a, d, f))
+        x, y, t = 1.0 / max(a, SINGULAR), 1.0 / max(d, SINGULAR), 1.0 / max(f, SINGULAR)
         return x, 0.0, 0.0, y, 0.0, t
     return aa / det, ab / det, ac / det, bb / det, bc / det, cc / det
 
@@ -81,17 +93,10 @@ def upper_inverted(
 @inner
 def inverse(m: Float, out: Float) -> None:
     """As ``inverted``, into ``out``."""
-    a, b, c, d, e, f = m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2]
-    aa, ab, ac = d * f - e * e, c * e - b * f, b * e - c * d
-    bb, bc, cc = a * f - c * c, b * c - a * e, a * d - b * b
-    det = a * aa + b * ab + c * ac
-    if det <= 0.0:
-        aa, bb, cc = 1.0 / max(a, SINGULAR), 1.0 / max(d, SINGULAR), 1.0 / max(f, SINGULAR)
-        ab = ac = bc = 0.0
-        det = 1.0
-    out[0, 0], out[0, 1], out[0, 2] = aa / det, ab / det, ac / det
-    out[1, 0], out[1, 1], out[1, 2] = ab / det, bb / det, bc / det
-    out[2, 0], out[2, 1], out[2, 2] = ac / det, bc / det, cc / det
+    six = upper_inverted(m[0, 0], m[0, 1], m[0, 2], m[1, 1], m[1, 2], m[2, 2])
+    out[0, 0], out[0, 1], out[0, 2] = six[0], six[1], six[2]
+    out[1, 0], out[1, 1], out[1, 2] = six[1], six[3], six[4]
+    out[2, 0], out[2, 1], out[2, 2] = six[2], six[4], six[5]
 
 
 @uncounted

@@ -4,7 +4,8 @@
 from collections.abc import Sequence
 from dataclasses import replace
 
-from slam.frames import Float, Frame, Odometry
+from slam.arrays import Float
+from slam.frames import Frame, Odometry
 
 
 class MotionSum:

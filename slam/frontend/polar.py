@@ -4,13 +4,9 @@
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-
-Float = NDArray[np.float64]
-Bools = NDArray[np.bool_]
-
+from slam.arrays import Bools, Float
 
 BEARING_OFF = 2e-5  # rad, more than ``bearing`` is ever off: 1.15e-5
 

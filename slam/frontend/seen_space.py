@@ -9,12 +9,12 @@ import math
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
+from slam.arrays import Bytes, Float, Ints
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
-from slam.frames import Float, Scan
+from slam.frames import Scan
 from slam.frontend.visibility import SILENT_M
 from slam.rasters import joined, trimmed
 
@@ -30,7 +30,7 @@ class SeenSpace:
         if not resolution_m > 0.0:
             raise InvalidValueError(f"resolution_m must be > 0 m, got {resolution_m}")
         self.resolution_m = resolution_m
-        self._tiles: dict[tuple[int, int], NDArray[np.uint8]] = {}
+        self._tiles: dict[tuple[int, int], Bytes] = {}
 
     def add(self, scan: Scan, T_map_robot: Float) -> None:
         """Mark what ``scan`` saw from ``T_map_robot`` (not de-skewed: a cell more or less).
@@ -90,9 +90,7 @@ class SeenSpace:
         T_map_origin = np.array([*origin, 0.0])
         return trimmed(Raster(values=out, resolution_m=step, T_map_origin=T_map_origin)) or map_
 
-    def _around(
-        self, map_: Raster, n: int, keys: NDArray[np.int64]
-    ) -> tuple[Float, NDArray[np.int64], list[int]]:
+    def _around(self, map_: Raster, n: int, keys: Ints) -> tuple[Float, Ints, list[int]]:
         """Of cells ``n`` times as wide as the map's around it and the tiles ``keys``: origin (2,)
         m, how many (2,) lie before the map, and how many there are along x and y.
         """
@@ -106,8 +104,8 @@ class SeenSpace:
         after = np.ceil((high - opposite) / step - 1e-9).astype(int)
         return corner - before * step, before, (before + inner + after).tolist()
 
-    def _cells(self, edge: float, count: int, step: float) -> NDArray[np.int64]:
+    def _cells(self, edge: float, count: int, step: float) -> Ints:
         """Our cells, along one axis, in which the centres of ``count`` others from ``edge`` lie."""
         centres = edge + (np.arange(count) + 0.5) * step
-        cells: NDArray[np.int64] = np.floor(centres / self.resolution_m).astype(np.int64)
+        cells: Ints = np.floor(centres / self.resolution_m).astype(np.int64)
         return cells

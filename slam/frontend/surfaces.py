@@ -3,10 +3,8 @@
 
 import math
 
-import numpy as np
-from numpy.typing import NDArray
-
 from slam._jit import inner
+from slam.arrays import Bools, Bytes, Float, Ints
 from slam.frontend.polar import bin_of
 
 NEAR_CELLS = 3.0  # cells; neighbouring hits this near are of one surface; set by hand
@@ -25,13 +23,7 @@ AWAY = int(FACES * OPPOSITE_DEG / 360.0)
 
 
 @inner
-def _one_line(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    first: int,
-    x: float,
-    y: float,
-) -> bool:
+def _one_line(points: Float, beams: Ints, first: int, x: float, y: float) -> bool:
     """True where hits ``first`` .. ``first + 3`` lie as on one straight surface seen from (x, y).
 
     They must come from neighbouring beams, go one way, and the inner two lie where their beams cut
@@ -65,12 +57,7 @@ def _one_line(
 
 @inner
 def join(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    origin: NDArray[np.float64],
-    near: float,
-    out: NDArray[np.bool_],
-    tangents: NDArray[np.float64],
+    points: Float, beams: Ints, origin: Float, near: float, out: Bools, tangents: Float
 ) -> None:
     """Mark the points whose surface goes on to the next one; fill the tangents.
 
@@ -102,12 +89,12 @@ def join(
 
 @inner
 def follow_ends(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    origin: NDArray[np.float64],
-    joined: NDArray[np.bool_],
+    points: Float,
+    beams: Ints,
+    origin: Float,
+    joined: Bools,
     sweep: tuple[float, int, float],
-    tangents: NDArray[np.float64],
+    tangents: Float,
 ) -> None:
     """Fill the tangents where a surface is no longer seen, but need not end.
 
@@ -153,8 +140,8 @@ def follow_ends(
 
 @inner
 def _onward(
-    points: NDArray[np.float64], k: int, origin: NDArray[np.float64], tx: float, ty: float,
-    increment: float,
+    points: Float, k: int, origin: Float, tx: float, ty: float,
+    increment: float
 ) -> float:  # fmt: skip
     """Range (m) at which a beam meets the line through hit ``k`` along (tx, ty); inf: never.
 
@@ -170,12 +157,7 @@ def _onward(
 
 
 @inner
-def face(
-    points: NDArray[np.float64],
-    origin: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    out: NDArray[np.uint8],
-) -> None:
+def face(points: Float, origin: Float, joined: Bools, out: Bytes) -> None:
     """The way the surface under each hit faces, in robot axes; 0 for a hit joined to none."""
     n = len(points)
     for k in range(n):
@@ -215,7 +197,7 @@ def opposite(one: int, other: int) -> bool:
 
 
 @inner
-def apart(points: NDArray[np.float64], j: int, k: int) -> float:
+def apart(points: Float, j: int, k: int) -> float:
     """m, between two of the points."""
     dx, dy = points[j, 0] - points[k, 0], points[j, 1] - points[k, 1]
     return math.sqrt(dx * dx + dy * dy)
@@ -223,11 +205,11 @@ def apart(points: NDArray[np.float64], j: int, k: int) -> float:
 
 @inner
 def unmixed(
-    points: NDArray[np.float64],
-    beams: NDArray[np.int64],
-    origin: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    out: NDArray[np.uint8],
+    points: Float,
+    beams: Ints,
+    origin: Float,
+    joined: Bools,
+    out: Bytes,
 ) -> int:
     """Mark the hits that are no mixed pixel, and count them.
 
@@ -249,6 +231,6 @@ def unmixed(
 
 
 @inner
-def _range(points: NDArray[np.float64], k: int, origin: NDArray[np.float64]) -> float:
+def _range(points: Float, k: int, origin: Float) -> float:
     dx, dy = points[k, 0] - origin[0], points[k, 1] - origin[1]
     return math.sqrt(dx * dx + dy * dy)

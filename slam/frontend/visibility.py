@@ -9,9 +9,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inlined, inner, uncounted
+from slam.arrays import Float
 from slam.frontend.polar import BEARING_OFF, bearing, bin_of
 
 MARGIN_CELLS = 1.5  # cells; a cell seen empty is before a beam's end by this; set by hand
@@ -34,8 +34,8 @@ class View(NamedTuple):
     """
 
     step: float
-    limit: NDArray[np.float64]
-    offset: NDArray[np.float64]
+    limit: Float
+    offset: Float
     farthest: float
     margin: float
     gate: float
@@ -43,12 +43,7 @@ class View(NamedTuple):
 
 @uncounted
 def fill(
-    bearings: NDArray[np.float64],
-    ranges: NDArray[np.float64],
-    step: float,
-    limit: NDArray[np.float64],
-    offset: NDArray[np.float64],
-    least: NDArray[np.float64],
+    bearings: Float, ranges: Float, step: float, limit: Float, offset: Float, least: Float
 ) -> float:
     """Limits and offsets of a ``View`` from beams in any order; the longest of their free ranges.
 
@@ -75,12 +70,7 @@ def fill(
     return farthest
 
 
-def view_of_beams(
-    bearings: NDArray[np.float64],
-    free_ranges: NDArray[np.float64],
-    increment: float,
-    cell: float,
-) -> View:
+def view_of_beams(bearings: Float, free_ranges: Float, increment: float, cell: float) -> View:
     """Sort beams (bearing rad, free range m; 0: not measured) into bins of about ``increment``."""
     bins = np.empty((2, n_bins(increment)))
     step = math.tau / bins.shape[1]
@@ -93,13 +83,13 @@ def n_bins(increment: float) -> int:
     return max(8, math.floor(math.tau / increment + 1e-6))
 
 
-def view_of_bins(bins: NDArray[np.float64], farthest: float, cell: float) -> View:
+def view_of_bins(bins: Float, farthest: float, cell: float) -> View:
     """Of limits and offsets (2, bins) that ``fill`` gave."""
     margin, gate = MARGIN_CELLS * cell, GATE_CELLS * cell
     return View(math.tau / bins.shape[1], bins[0], bins[1], farthest, margin, gate)
 
 
-def view_of_features(points: NDArray[np.float64], cell: float) -> View:
+def view_of_features(points: Float, cell: float) -> View:
     """What a frame of point features (n, 2) m sees: the sectors between neighbours, as far as the
     farther of the two, and nothing behind a feature.
     """

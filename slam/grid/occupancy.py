@@ -11,25 +11,17 @@ from dataclasses import dataclass, field
 from typing import Any, ClassVar, NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slam._jit import njit
+from slam._jit import njit, uncounted
+from slam.arrays import Float, Float32, Int32
 from slam.estimate import Raster
-from slam.frames import Float
-from slam.frontend.visibility import View, free_around, seen_empty
+from slam.frontend.visibility import View, seen_empty
 from slam.settings import Settings, number
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import (
-    FREE_COUNT,
-    SIDE,
-    Cells,
-    Look,
-    in_reach,
-    stamped,
-)  # fmt: skip
+from slam.tracker.cells import SIDE, Cells, Look, born, free_at, in_reach, lasting, stamped
 from slam.tracker.config import TrackerConfig
 from slam.tracker.network import Network
-from slam.tracker.standing.config import ALL_VOTE, StandingConfig
+from slam.tracker.standing.config import FULL_WEIGHT, StandingConfig
 from slam.tracker.tracker import Tracker
 
 OCTOMAP = "Hornung et al. 2013"
@@ -57,7 +49,7 @@ class OccupancyConfig(TrackerConfig):
     Every return has full weight: the grid stays what it is elsewhere.
     """
 
-    standing: StandingConfig = field(default=ALL_VOTE)
+    standing: StandingConfig = field(default=FULL_WEIGHT)
     grid: GridConfig = field(default=GridConfig())
 
 
@@ -70,39 +62,23 @@ class Odds(NamedTuple):
     struck: float
 
 
-@njit
-def _open(cells: Cells, view: View, T_map_laser: NDArray[np.float64], cell: float) -> bool:
+@uncounted
+def _open(cells: Cells, view: View, T_map_laser: Float, cell: float) -> bool:
     """Let every block in view live: a grid also remembers where it saw nothing. False: no room."""
-    ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
-    size = SIDE * cell
-    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, size)
+    laser = (T_map_laser[0], T_map_laser[1], c, s)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, SIDE * cell)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
-            if cells.directory[row, column] >= 0:
-                continue
-            bx = (column + cells.corner[0] + 0.5) * size - ox
-            by = (row + cells.corner[1] + 0.5) * size - oy
-            dx, dy, half = c * bx + s * by, c * by - s * bx, 0.71 * size
-            if free_around(view, dx, dy, half) <= math.sqrt(dx * dx + dy * dy) - half:
-                continue
-            if cells.counts[FREE_COUNT] == 0:
+            hidden = free_at(cells, view, laser, cell, row, column) < 0.0
+            if cells.directory[row, column] < 0 and not hidden and born(cells, row, column) < 0:
                 return False
-            cells.counts[FREE_COUNT] -= 1
-            slot = cells.free[cells.counts[FREE_COUNT]]
-            cells.directory[row, column] = slot
-            cells.x[slot] = 0.0
-            cells.y[slot] = 0.0
-            cells.age[slot] = 0.0
-            cells.facing[slot] = 0
-            cells.off[slot] = 0
-            cells.scratch_of[slot] = -1
     return True
 
 
-@njit
+@uncounted
 def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
-    cells: Cells, log_odds: NDArray[np.float32], view: View, T_map_laser: NDArray[np.float64],
+    cells: Cells, log_odds: Float32, view: View, T_map_laser: Float,
     cell: float, step: float, odds: Odds, known_s: float, off: int, write: bool,
 ) -> Look:  # fmt: skip
     """Add one scan, ``step`` s after the last, to ``log_odds`` (S, 8, 8) by slot.
@@ -114,26 +90,22 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
     known, through = 0.0, 0.0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
-    size = SIDE * cell
-    half = 0.71 * size
-    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, size)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, SIDE * cell)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             slot = cells.directory[row, column]
             if slot < 0:
                 continue
             scratch = cells.scratch_of[slot]
-            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
-            bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
-            dx, dy = c * bx + s * by, c * by - s * bx
-            free = free_around(view, dx, dy, half)
-            if scratch < 0 and free <= math.sqrt(dx * dx + dy * dy) - half:
+            free = free_at(cells, view, (ox, oy, c, s), cell, row, column)
+            if scratch < 0 and free < 0.0:
                 continue
+            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
             for jj in range(SIDE):
                 for ii in range(SIDE):
                     given = cells.impression[scratch, jj, ii] if scratch >= 0 else np.float32(0.0)
                     y, age = cells.y[slot, jj, ii], cells.age[slot, jj, ii]
-                    weight = y * age / (age + known_s)
+                    weight = lasting(y, age, known_s)
                     if given == 0.0:
                         px = (i0 + ii + 0.5) * cell - ox
                         py = (j0 + jj + 0.5) * cell - oy
@@ -162,9 +134,7 @@ def integrate(  # noqa: C901, PLR0913, PLR0915 (kernel)
 
 
 @njit
-def _probabilities(
-    cells: Cells, log_odds: NDArray[np.float32], i0: int, j0: int, n: int, out: NDArray[np.float32]
-) -> None:
+def _probabilities(cells: Cells, log_odds: Float32, i0: int, j0: int, n: int, out: Float32) -> None:
     """Into ``out``, NaN so far, from cell (i0, j0) on, ``n`` a side as one: the largest of them."""
     rows, columns = cells.directory.shape
     for row in range(rows):
@@ -215,11 +185,11 @@ class Grid(CellMap):
         more = len(self.cells.age) - len(self.log_odds)
         self.log_odds = np.concatenate([self.log_odds, np.zeros((more, SIDE, SIDE), np.float32)])
 
-    def kept(self, slots: NDArray[np.int32]) -> NDArray[np.float32]:
+    def kept(self, slots: Int32) -> Float32:
         """Log-odds, which a file has in the place of ages."""
         return self.log_odds[slots]
 
-    def restore(self, slot: int, kept: NDArray[np.float32]) -> None:
+    def restore(self, slot: int, kept: Float32) -> None:
         """Log-odds of a file, and the least time of looking that they took."""
         self.log_odds[slot] = kept
         looks = np.where(kept > 0.0, kept / self._odds.hit, kept / min(self._odds.miss, -1e-3))

@@ -19,13 +19,12 @@ from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frames import Float
+from slam.arrays import Bools, Float, Ints
 from slam.landmarks import kernels
 from slam.landmarks.filter import EkfFilter
-from slam.landmarks.hypotheses import Association, Gates, Ints
+from slam.landmarks.hypotheses import Association, Gates
 from slam.landmarks.kernels import ITERATIONS, SETTLED, absorb, look
 
 
@@ -36,7 +35,7 @@ def distances(  # noqa: C901, PLR0913 (kernel)
     P: Float,
     z: Float,
     R: Float,
-    wanted: NDArray[np.bool_],
+    wanted: Bools,
     gate: float,
     limit: float,
 ) -> Float:
@@ -130,7 +129,6 @@ def pair_cost(pose: Float, landmark: Float, M: Float, z: Float, R: Float) -> flo
     return cost
 
 
-Bools = NDArray[np.bool_]
 PAIRS, NODES = range(2)  # places in ``Search.counts``
 
 
@@ -306,9 +304,9 @@ def _prior_costs(
     )
 
 
-def _any(costs: Float) -> NDArray[np.bool_]:
+def _any(costs: Float) -> Bools:
     """(k,) which points have a finite cost with some landmark."""
-    out: NDArray[np.bool_] = np.asarray(np.isfinite(costs).any(axis=1))
+    out: Bools = np.asarray(np.isfinite(costs).any(axis=1))
     return out
 
 

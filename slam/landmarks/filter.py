@@ -4,11 +4,11 @@
 import math
 
 import numpy as np
-from numpy.typing import ArrayLike, NDArray
+from numpy.typing import ArrayLike
 
 from slam import se2
+from slam.arrays import Float, Ints
 from slam.errors import InvalidValueError
-from slam.frames import Float
 from slam.frontend import odometry_prior
 from slam.landmarks import kernels
 
@@ -89,7 +89,7 @@ class EkfFilter:
             )
         return float(cost)
 
-    def add(self, points_robot: Float, covariances: Float) -> NDArray[np.int64]:
+    def add(self, points_robot: Float, covariances: Float) -> Ints:
         """New landmarks from points (m, 2) seen now, fully correlated with all there is.
 
         l = p + R z, so xi_l = xi_p + R n. Returns their indices (m,).
@@ -128,7 +128,7 @@ class EkfFilter:
         """(n, 2, 2) m^2 in the map frame."""
         return self._plain(self.landmarks, 3 + 2 * np.arange(self._n))[:, :2, :2]
 
-    def _plain(self, points: Float, places: NDArray[np.int64]) -> Float:
+    def _plain(self, points: Float, places: Ints) -> Float:
         """(k, 3, 3) covariance of each (point, heading): dp = xi_p + J p dtheta, ``places`` (k,)
         being those of the xi_p."""
         P, x, y = self._P, points[:, 0], points[:, 1]

@@ -4,14 +4,11 @@
 from dataclasses import dataclass
 from functools import lru_cache
 
-import numpy as np
-from numpy.typing import NDArray
-
+from slam.arrays import Bools, Ints
 from slam.settings import Settings, number
 
 MOST_GATE = 1.0 - 1e-15
 TUNED = "training seeds 0-19 (docs/paper/method.md)"
-Ints = NDArray[np.int64]
 
 
 @lru_cache(maxsize=1024)
@@ -74,7 +71,7 @@ class Association:
 
     landmarks: Ints
     cost: float
-    plausible: NDArray[np.bool_]
+    plausible: Bools
 
     @property
     def matched(self) -> int:

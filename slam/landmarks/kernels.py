@@ -19,11 +19,9 @@ that was never measured, the classic inconsistency of EKF-SLAM (Julier and Uhlma
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-
-Float = NDArray[np.float64]
+from slam.arrays import Float, Ints
 
 
 @njit
@@ -209,7 +207,7 @@ def disturb(P: Float, pose: Float, landmarks: Float, n: int, heading: float, Q: 
 
 @njit
 def linearise(  # noqa: C901, PLR0912 (kernel)
-    pose: Float, landmarks: Float, P: Float, matched: NDArray[np.int64], z: Float, R: Float
+    pose: Float, landmarks: Float, P: Float, matched: Ints, z: Float, R: Float
 ) -> tuple[Float, Float, Float, float]:
     """Gauss-Newton on the m matched landmarks and the pose alone, which is exact: P is Gaussian.
 
@@ -262,7 +260,7 @@ def linearise(  # noqa: C901, PLR0912 (kernel)
 
 
 @njit
-def gather(P: Float, chosen: NDArray[np.int64]) -> Float:
+def gather(P: Float, chosen: Ints) -> Float:
     """The marginal (3 + 2 m, 3 + 2 m) of the pose and the chosen landmarks."""
     m = len(chosen)
     index = np.empty(3 + 2 * m, dtype=np.int64)
@@ -282,7 +280,7 @@ def absorb(  # noqa: PLR0913 (kernel)
     landmarks: Float,
     n: int,
     P: Float,
-    matched: NDArray[np.int64],
+    matched: Ints,
     z: Float,
     R: Float,
 ) -> float:
@@ -323,7 +321,7 @@ def _copy(source: Float, target: Float) -> None:
 
 
 @inner
-def _times_sparse(P: Float, matched: NDArray[np.int64], H: Float, out: Float) -> None:
+def _times_sparse(P: Float, matched: Ints, H: Float, out: Float) -> None:
     """(P H')' in ``out`` (2 m, size), H's columns being the pose and the matched landmarks."""
     for row in range(len(out)):
         k = row // 2

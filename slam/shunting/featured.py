@@ -22,12 +22,12 @@ from statistics import median
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
+from slam.arrays import Bools, Float
 from slam.errors import InvalidValueError
 from slam.estimate import Estimate
-from slam.frames import Float, Frame
+from slam.frames import Frame
 from slam.frontend.corners import corners
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted, turned
@@ -54,7 +54,7 @@ class _Agreed:
     and the information (3, 3) on the pose that these pairs are."""
 
     T_map_robot: Float
-    accepted: NDArray[np.bool_]
+    accepted: Bools
     information: Float
 
 
@@ -123,7 +123,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
         agreed = self._agreed(observations, prediction)
         if int(agreed.accepted.sum()) < self.config.features.enough_pairs:
             return self._matcher.match(observations, prediction, cell_map)
-        pulling = dataclasses.replace(observations, weights=agreed.accepted.astype(np.float64))
+        pulling = dataclasses.replace(observations, shares=agreed.accepted.astype(np.float64))
         if self.config.objective == "log":
             # Eq. (13) as printed, from where the pairs lead: the sum of the logarithms of overlaps
             match = self._matcher.climb(

@@ -56,7 +56,7 @@ class Reference:
         seen = observe(frame, prior.twist, FRONT_END)
         if before is not frame.odometry:
             C = seen.covariances[:, [0, 1, 1, 2]].reshape(-1, 2, 2)
-            beams = seen.points_robot, C, seen.weights, seen.tangents
+            beams = seen.points_robot, C, seen.shares, seen.tangents
             start = self._climb(beams, prior.T_map_robot, prior, coarse=True)
             self.T_map_robot = self._climb(beams, start, prior, coarse=False)
         self._excite(seen, prior.elapsed or FIRST_S)

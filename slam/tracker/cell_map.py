@@ -11,9 +11,9 @@ import math
 from typing import Any, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import uncounted
+from slam.arrays import Float, Float32, Int32
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frontend.visibility import View
@@ -24,7 +24,6 @@ from slam.tracker.cells import (
     Cells,
     Look,
     living,
-    named,
     no_cells,
     released,
     used,
@@ -40,7 +39,7 @@ MAX_CELLS = 1 << 26  # of a raster, 256 MiB: 245 m square at 3 cm; a larger map 
 
 @uncounted
 def _release(arrays: tuple[Any, ...]) -> None:
-    released(named(arrays))
+    released(Cells(*arrays))
 
 
 class CellMap(abc.ABC):
@@ -77,36 +76,26 @@ class CellMap(abc.ABC):
 
     def cover(self, xmin: float, ymin: float, xmax: float, ymax: float) -> None:
         """Grow the directory so that blocks may be born anywhere in the rectangle (m)."""
-        size = SIDE * self.cell
-        rows, columns = self.cells.directory.shape
-        cx, cy = (int(v) for v in self.cells.corner)
-        low = (min(cx, math.floor(xmin / size) - 1), min(cy, math.floor(ymin / size) - 1))
-        high = (
-            max(cx + columns, math.floor(xmax / size) + 2),
-            max(cy + rows, math.floor(ymax / size) + 2),
-        )
-        if low == (cx, cy) and high == (cx + columns, cy + rows):
+        size, first = SIDE * self.cell, self.cells.corner
+        shape = np.array(self.cells.directory.shape[::-1])
+        last = first + shape
+        low = np.minimum(first, np.floor(np.array([xmin, ymin]) / size).astype(np.int64) - 1)
+        high = np.maximum(last, np.floor(np.array([xmax, ymax]) / size).astype(np.int64) + 2)
+        if (low == first).all() and (high == last).all():
             return
         # Grow by half of the present extent on the side that asks, so that growing stays rare.
-        low = (
-            low[0] - columns // 2 if low[0] < cx else cx,
-            low[1] - rows // 2 if low[1] < cy else cy,
-        )
-        high = (
-            high[0] + columns // 2 if high[0] > cx + columns else cx + columns,
-            high[1] + rows // 2 if high[1] > cy + rows else cy + rows,
-        )
-        across, along = high[0] - low[0], high[1] - low[1]
+        low = np.where(low < first, low - shape // 2, first)
+        high = np.where(high > last, high + shape // 2, last)
+        across, along = (high - low).tolist()
         if max(across, along) > MAX_BLOCKS_ACROSS or across * along > MAX_DIRECTORY:
             raise InvalidValueError(
                 f"the map would be {across * size:.0f} m x {along * size:.0f} m across; "
                 f"cell_m = {self.cell} is too small for this stream, or its poses jump"
             )
-        grown = np.full((high[1] - low[1], high[0] - low[0]), -1, np.int32)
-        grown[cy - low[1] : cy - low[1] + rows, cx - low[0] : cx - low[0] + columns] = (
-            self.cells.directory
-        )
-        self.cells = self.cells._replace(directory=grown, corner=np.array(low, np.int64))
+        grown = np.full((along, across), -1, np.int32)
+        (i, j), (columns, rows) = (first - low).tolist(), shape.tolist()
+        grown[j : j + rows, i : i + columns] = self.cells.directory
+        self.cells = self.cells._replace(directory=grown, corner=low)
 
     def grow(self) -> None:
         """Make room where a kernel ran out of it."""
@@ -116,11 +105,11 @@ class CellMap(abc.ABC):
         """Forget the present impressions, and the blocks that were born under them in vain."""
         _release(tuple(self.cells))
 
-    def kept(self, slots: NDArray[np.int32]) -> NDArray[np.float32]:
+    def kept(self, slots: Int32) -> Float32:
         """(n, 8, 8) what a file keeps as ``age``."""
         return self.cells.age[slots]
 
-    def restore(self, slot: int, kept: NDArray[np.float32]) -> None:
+    def restore(self, slot: int, kept: Float32) -> None:
         """Let a block of a file have what ``kept`` gave."""
         self.cells.age[slot] = kept
 
@@ -128,16 +117,14 @@ class CellMap(abc.ABC):
     def integrate(
         self,
         view: View,
-        T_map_laser: NDArray[np.float64],
+        T_map_laser: Float,
         step: float,
         *,
         write: bool,
     ) -> Look:
         """Take the present impressions in for ``step`` s; ``write`` False only looks."""
 
-    def window(
-        self, xmin: float, ymin: float, xmax: float, ymax: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def window(self, xmin: float, ymin: float, xmax: float, ymax: float) -> tuple[Float32, Float32]:
         """Dense short-term x and long-term y of the cells whose centres lie in the rectangle (m).
 
         Row 0 is the lowest y. Both are 0 where nothing lives.
@@ -167,9 +154,7 @@ class CellMap(abc.ABC):
             n += 1
         return n
 
-    def raster(
-        self, values: NDArray[np.float32], extent: tuple[int, int, int, int], n: int = 1
-    ) -> Raster:
+    def raster(self, values: Float32, extent: tuple[int, int, int, int], n: int = 1) -> Raster:
         """``values`` of the cells of ``extent``, ``n`` a side as one."""
         origin = np.array([extent[0] * self.cell, extent[1] * self.cell, 0.0])
         return Raster(values=values, resolution_m=n * self.cell, T_map_origin=origin)

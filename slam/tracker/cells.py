@@ -11,9 +11,10 @@ from typing import Any, NamedTuple
 import numpy as np
 from numpy.typing import NDArray
 
-from slam._jit import inner
+from slam._jit import inlined, inner
+from slam.arrays import Bytes, Float, Float32, Int32, Ints
 from slam.frontend.surfaces import FACES
-from slam.frontend.visibility import View
+from slam.frontend.visibility import View, free_around
 
 SIDE = 8  # cells along a block's edge
 SHIFT, MASK = 3, 7  # i >> SHIFT is the block of cell i, i & MASK its place inside
@@ -42,26 +43,29 @@ class Cells(NamedTuple):
     counts      (2,) int64: unused slots, touched blocks
     """
 
-    directory: NDArray[np.int32]
-    corner: NDArray[np.int64]
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
-    age: NDArray[np.float32]
-    facing: NDArray[np.uint8]
-    off: NDArray[np.uint8]
-    free: NDArray[np.int32]
-    scratch_of: NDArray[np.int32]
-    impression: NDArray[np.float32]
-    faced: NDArray[np.uint8]
-    touched: NDArray[np.int32]
-    counts: NDArray[np.int64]
+    directory: Int32
+    corner: Ints
+    x: Float32
+    y: Float32
+    age: Float32
+    facing: Bytes
+    off: Bytes
+    free: Int32
+    scratch_of: Int32
+    impression: Float32
+    faced: Bytes
+    touched: Int32
+    counts: Ints
 
 
-@inner
-def named(arrays: tuple[Any, ...]) -> Cells:
-    """The arrays of ``Cells``, which take a microsecond more than a plain tuple to a kernel."""
-    a = arrays
-    return Cells(a[0], a[1], a[2], a[3], a[4], a[5], a[6], a[7], a[8], a[9], a[10], a[11], a[12])
+class Field(NamedTuple):
+    """The arrays of ``Cells`` that overlaps need: all thirteen would be copied at every call."""
+
+    directory: Int32
+    corner: Ints
+    x: Float32
+    y: Float32
+    facing: Bytes
 
 
 class Look(NamedTuple):
@@ -104,6 +108,70 @@ def stamped(before: int, weight: float, sure: float, now: int) -> int:
     Or less, where it is seen again while the map is off by less.
     """
     return min(before, now) if weight >= sure else now
+
+
+@inlined
+def lasting(y: Any, age: Any, known_s: float) -> Any:
+    """w of ``Look``: the long-known part of a trace."""
+    return y * age / (age + known_s)
+
+
+@inlined
+def activity(cells: Cells | Field, short_term: float, slot: int, j: int, i: int) -> float:
+    """v = y + (1 - y) short_term x of a cell of a block: what observations are matched to."""
+    x, y = cells.x[slot, j, i], cells.y[slot, j, i]
+    return float(y + (1.0 - y) * short_term * x)
+
+
+@inlined
+def slot_of(cells: Cells, i: int, j: int) -> int:
+    """Of the block in which cell (i, j) lies; -1 where none lives."""
+    row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
+    rows, columns = cells.directory.shape
+    if 0 <= row < rows and 0 <= column < columns:
+        return int(cells.directory[row, column])
+    return -1
+
+
+@inner
+def born(cells: Cells, row: int, column: int) -> int:
+    """The slot of a block that begins to live at a place of the directory; -1: no room is left."""
+    if cells.counts[FREE_COUNT] == 0:
+        return -1
+    cells.counts[FREE_COUNT] -= 1
+    slot = cells.free[cells.counts[FREE_COUNT]]
+    cells.directory[row, column] = slot
+    cells.scratch_of[slot] = -1
+    for j in range(SIDE):
+        for i in range(SIDE):
+            cells.x[slot, j, i] = cells.y[slot, j, i] = cells.age[slot, j, i] = 0.0
+            cells.facing[slot, j, i] = cells.off[slot, j, i] = 0
+    return int(slot)
+
+
+@inner
+def dies(cells: Cells, row: int, column: int) -> None:
+    """The block at a place of the directory lives no more."""
+    cells.free[cells.counts[FREE_COUNT]] = cells.directory[row, column]
+    cells.counts[FREE_COUNT] += 1
+    cells.directory[row, column] = -1
+
+
+@inlined
+def free_at(
+    cells: Cells, view: View, laser: tuple[float, float, float, float], cell: float, row: int,
+    column: int,
+) -> float:  # fmt: skip
+    """Longest free range, m, in the bins of a block: ``free_around``; -1 where it is hidden.
+
+    ``laser``: its place in the map, and cosine and sine of its heading.
+    """
+    ox, oy, c, s = laser
+    bx = (column + cells.corner[0] + 0.5) * SIDE * cell - ox
+    by = (row + cells.corner[1] + 0.5) * SIDE * cell - oy
+    dx, dy, half = c * bx + s * by, c * by - s * bx, 0.71 * SIDE * cell
+    free = free_around(view, dx, dy, half)
+    return free if free > math.sqrt(dx * dx + dy * dy) - half else -1.0
 
 
 def no_cells(slots: int = FIRST, scratch: int = FIRST) -> Cells:
@@ -170,7 +238,7 @@ def _longer(array: NDArray[Any], more: int, fill: float) -> NDArray[Any]:
     return longer
 
 
-def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
+def living(cells: Cells) -> tuple[Int32, Ints]:
     """Slots (n,) of the living blocks and their block indices (n, 2: x, y), by rows."""
     rows, columns = np.nonzero(cells.directory >= 0)
     return cells.directory[rows, columns], np.stack([columns, rows], axis=1) + cells.corner
@@ -178,7 +246,7 @@ def living(cells: Cells) -> tuple[NDArray[np.int32], NDArray[np.int64]]:
 
 @inner
 def in_reach(
-    cells: Cells, view: View, T_map_laser: NDArray[np.float64], size: float
+    cells: Cells, view: View, T_map_laser: Float, size: float
 ) -> tuple[int, int, int, int]:
     """Directory rows and columns (first, past the last, each) of the blocks that are touched, or
     not hidden from the view: their centres are at most half a block beyond a free range, and that
@@ -226,7 +294,5 @@ def released(cells: Cells) -> None:
             for i in range(SIDE):
                 alive |= cells.x[slot, j, i] != 0.0 or cells.age[slot, j, i] != 0.0
         if not alive:
-            cells.directory[row, column] = -1
-            cells.free[cells.counts[FREE_COUNT]] = slot
-            cells.counts[FREE_COUNT] += 1
+            dies(cells, row, column)
     cells.counts[TOUCHED_COUNT] = 0

@@ -16,7 +16,7 @@ from slam.settings import Settings, number, word
 from slam.tracker.belief.config import BeliefConfig
 from slam.tracker.map_config import MapConfig
 from slam.tracker.matching.config import MatchingConfig
-from slam.tracker.standing.config import ALL_VOTE, StandingConfig
+from slam.tracker.standing.config import FULL_WEIGHT, StandingConfig
 from slam.tracker.tracking.config import LoopsConfig, TrackingConfig
 from slam.tracker.uncertainty.config import UncertaintyConfig
 
@@ -161,7 +161,7 @@ class TrackerConfig(Settings):
             "reward_exponent": 0.0,
             "objective": "log",
             "carried_per_h": 0.0,
-            "standing": ALL_VOTE,
+            "standing": FULL_WEIGHT,
             "loops": LoopsConfig(corrects=0),
         }
         return cls(**(printed | changes))

@@ -24,23 +24,20 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.archives import read_arrays, write_arrays
+from slam.arrays import Float
 from slam.checked import covariance, is_number, pose
 from slam.errors import InvalidValueError, LogFormatError
 from slam.files import replacing
-from slam.frames import Float
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import FREE_COUNT, MOST_OFF, SIDE, living
 from slam.tracker.config import TrackerConfig
 
 # Numbers that trackers no longer have, of maps that were saved while they had them.
-_GROUPS = {
+_GONE: dict[str, tuple[str, ...]] = {
     "": ("range_error",),
-    "tracking": ("quality", "verdict"),
-    "frontend": ("surfaces", "view", "prior"),
     "features": ("corners",),
-}
-_NUMBERS: dict[str, tuple[str, ...]] = {
-    "frontend": ("spacing_m", "least_weight"),
+    "frontend": ("surfaces", "view", "prior", "spacing_m", "least_weight"),
+    "tracking": ("quality", "verdict"),
     "belief": (
         "alike", "broken", "breaks", "changed_per_m", "confirmed", "confirmed_m",
         "confirmed_share", "corrected", "goes_on", "linear_m", "nearby_per_m", "outdated", "place",
@@ -81,7 +78,7 @@ def updated(words: Any) -> Any:
 
 
 def _without(words: Mapping[str, Any], path: str) -> dict[str, Any]:
-    gone = (*_GROUPS.get(path, ()), *_NUMBERS.get(path, ()))
+    gone = _GONE.get(path, ())
     return {
         name: _without(value, f"{path}.{name}".lstrip(".")) if isinstance(value, Mapping) else value
         for name, value in words.items()

@@ -10,23 +10,24 @@ import math
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
+from slam.arrays import Float
 from slam.frontend.surfaces import opposite
-from slam.frontend.visibility import View, free_around, seen_empty
+from slam.frontend.visibility import View, seen_empty
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import (
-    FREE_COUNT,
     MASK,
-    SHIFT,
     SIDE,
     Cells,
     Look,
     crossed,
+    dies,
+    free_at,
     in_reach,
-    named,
+    lasting,
     released,
+    slot_of,
     stamped,
 )  # fmt: skip
 from slam.tracker.config import TrackerConfig
@@ -68,14 +69,12 @@ class Law(NamedTuple):
 def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
     """Sum of w_ij d(x_j) over the neighbours of neuron (i, j), d(x) = max(x - sigma, 0)."""
     edge = math.ceil(law.reach)
-    rows, columns = cells.directory.shape
     total = 0.0
     for b in range(j - edge, j + edge + 1):
         for a in range(i - edge, i + edge + 1):
             d = math.sqrt((a - i) * (a - i) + (b - j) * (b - j))
-            row, column = (b >> SHIFT) - cells.corner[1], (a >> SHIFT) - cells.corner[0]
-            if 0.0 < d < law.reach and 0 <= row < rows and 0 <= column < columns:
-                slot = cells.directory[row, column]
+            if 0.0 < d < law.reach:
+                slot = slot_of(cells, a, b)
                 above = cells.x[slot, b & MASK, a & MASK] - law.threshold if slot >= 0 else 0.0
                 if above > 0.0:
                     total += law.mu / d * above
@@ -86,7 +85,7 @@ def lateral(cells: Cells, law: Law, i: int, j: int) -> float:
 def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
     arrays: tuple[Any, ...],
     plain_view: tuple[Any, ...],
-    T_map_laser: NDArray[np.float64],
+    T_map_laser: Float,
     cell: float,
     numbers: tuple[Any, ...],
     write: bool,
@@ -97,26 +96,22 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
     ``arrays`` of ``Cells``, ``View`` and the ``numbers`` of a
     ``Law`` as plain tuples: those get here sooner.
     """
-    cells, view, law = named(arrays), View(*plain_view), Law(*numbers)
+    cells, view, law = Cells(*arrays), View(*plain_view), Law(*numbers)
     confirmed, contradicted, visited = 0.0, 0.0, 0
     known, through = 0.0, 0.0
     ox, oy = T_map_laser[0], T_map_laser[1]
     c, s = math.cos(T_map_laser[2]), math.sin(T_map_laser[2])
-    size = SIDE * cell
-    half = 0.71 * size
-    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, size)
+    first_row, last_row, first_column, last_column = in_reach(cells, view, T_map_laser, SIDE * cell)
     for row in range(first_row, last_row):
         for column in range(first_column, last_column):
             slot = cells.directory[row, column]
             if slot < 0:
                 continue
             scratch = cells.scratch_of[slot]
-            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
-            bx, by = (i0 + 0.5 * SIDE) * cell - ox, (j0 + 0.5 * SIDE) * cell - oy
-            dx, dy = c * bx + s * by, c * by - s * bx
-            free = free_around(view, dx, dy, half)
-            if scratch < 0 and free <= math.sqrt(dx * dx + dy * dy) - half:
+            free = free_at(cells, view, (ox, oy, c, s), cell, row, column)
+            if scratch < 0 and free < 0.0:
                 continue
+            i0, j0 = (column + cells.corner[0]) * SIDE, (row + cells.corner[1]) * SIDE
             alive = False
             for jj in range(SIDE):
                 for ii in range(SIDE):
@@ -124,8 +119,9 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
                     given = cells.impression[scratch, jj, ii] if scratch >= 0 else np.float32(0.0)
                     if x == 0.0 and y == 0.0 and given == 0.0:
                         continue
+                    age, facing = cells.age[slot, jj, ii], cells.facing[slot, jj, ii]
                     faced = cells.faced[scratch, jj, ii] if scratch >= 0 else 0
-                    behind = given > 0.0 and opposite(int(faced), cells.facing[slot, jj, ii])
+                    behind = given > 0.0 and opposite(int(faced), facing)
                     if behind and given <= y:  # the back of a known surface is hidden
                         alive = True
                         continue
@@ -136,16 +132,10 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
                             alive = True
                             continue
                         contradicted += y
-                        weight = (
-                            y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
-                        )
-                        weight *= crossed(cells.facing[slot, jj, ii], px, py)
-                        through += weight
+                        through += lasting(y, age, law.known_s) * crossed(facing, px, py)
                     elif not behind:
                         confirmed += y * given
-                        weight = (
-                            y * cells.age[slot, jj, ii] / (cells.age[slot, jj, ii] + law.known_s)
-                        )
+                        weight = lasting(y, age, law.known_s)
                         known += weight * given
                         if write:
                             before = cells.off[slot, jj, ii]
@@ -163,7 +153,6 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
                         x = np.float32(0.0)
                     cells.x[slot, jj, ii] = x
                     if law.trace:
-                        age = cells.age[slot, jj, ii]
                         y = np.float32(y + (given - y) * law.step / (age + law.step + law.pace))
                         age = np.float32(min(age + law.step, law.oldest))
                         if y < law.faded and given < law.unseen:
@@ -175,9 +164,7 @@ def integrate(  # noqa: C901, PLR0912, PLR0915 (kernel)
                     if x > 0.0 or y > 0.0:
                         alive = True
             if write and not alive:
-                cells.directory[row, column] = -1
-                cells.free[cells.counts[FREE_COUNT]] = slot
-                cells.counts[FREE_COUNT] += 1
+                dies(cells, row, column)
     if write:
         released(cells)
     return Look(confirmed, contradicted, visited, known * cell, through * cell)
@@ -194,38 +181,31 @@ class Network(CellMap):
         reach = config.lateral_reach_cells
         self.mu = lateral_mu(config.lateral_sum, reach) if lateral else 0.0
 
-    def integrate(
-        self,
-        view: View,
-        T_map_laser: NDArray[np.float64],
-        step: float,
-        *,
-        write: bool,
-    ) -> Look:
+    def integrate(self, view: View, T_map_laser: Float, step: float, *, write: bool) -> Look:
         """Take the present impressions in for ``step`` s; see the kernel of the same name."""
-        numbers, pace = self.config.map, self.pace(step)
-        law = (
-            step,
-            pace,
-            numbers.oldest_paces * pace,
-            self.config.decay_per_s,
-            self.config.threshold,
-            self.mu,
-            self.config.lateral_reach_cells,
-            self.config.trace_s > 0.0,
-            numbers.faded,
-            numbers.unseen,
-            numbers.known_s,
-            self.off_cm,
+        config, numbers, pace = self.config, self.config.map, self.pace(step)
+        law = Law(
+            step=step,
+            pace=pace,
+            oldest=numbers.oldest_paces * pace,
+            decay=config.decay_per_s,
+            threshold=config.threshold,
+            mu=self.mu,
+            reach=config.lateral_reach_cells,
+            trace=config.trace_s > 0.0,
+            faded=numbers.faded,
+            unseen=numbers.unseen,
+            known_s=numbers.known_s,
+            off=self.off_cm,
         )
         arrays = tuple(self.cells)
-        return integrate(arrays, tuple(view), T_map_laser, self.cell, law, write)
+        return integrate(arrays, tuple(view), T_map_laser, self.cell, tuple(law), write)
 
 
 def lateral_mu(total: float, reach: float) -> float:
     """mu such that the weights mu / d over 0 < d < reach sum to ``total``."""
-    inverse_distances = 0.0
     edge = math.ceil(reach)
+    inverse_distances = 0.0
     for dj in range(-edge, edge + 1):
         for di in range(-edge, edge + 1):
             d = math.sqrt(di * di + dj * dj)

@@ -11,22 +11,22 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
 from slam._jit import inlined, inner, uncounted
-from slam.frames import Float
+from slam.arrays import Bools, Bytes, Float, Float32
 from slam.frontend.observations import Observations
+from slam.frontend.odometry_prior import rotate
 from slam.frontend.surfaces import turned_face
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import FREE_COUNT, MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Look, named
+from slam.tracker.cells import MASK, SHIFT, SIDE, TOUCHED_COUNT, Cells, Look, born
 from slam.tracker.map_config import MapConfig
 
 FINE = MapConfig().bell_steps
 
 
 @functools.cache
-def _bell(ends: float) -> NDArray[np.float32]:
+def _bell(ends: float) -> Float32:
     """I by the squared Mahalanobis distance, ``FINE`` entries for each unit of it."""
     entries = range(int(ends * FINE))
     return np.array([math.exp(-0.5 * k / FINE) for k in entries] + [0.0], np.float32)
@@ -41,23 +41,16 @@ def _touch(cells: Cells, column: int, row: int) -> int:
     scratch = cells.counts[TOUCHED_COUNT]
     if scratch == len(cells.touched):
         return -1
-    slot, born = cells.directory[row, column], 0
+    slot, new = int(cells.directory[row, column]), 0
     if slot < 0:
-        if cells.counts[FREE_COUNT] == 0:
+        slot, new = born(cells, row, column), 1
+        if slot < 0:
             return -1
-        cells.counts[FREE_COUNT] -= 1
-        slot = cells.free[cells.counts[FREE_COUNT]]
-        cells.directory[row, column] = slot
-        cells.scratch_of[slot], born = -1, 1
-        for j in range(SIDE):
-            for i in range(SIDE):
-                cells.x[slot, j, i] = cells.y[slot, j, i] = cells.age[slot, j, i] = 0.0
-                cells.facing[slot, j, i] = cells.off[slot, j, i] = 0
     cells.counts[TOUCHED_COUNT] += 1
     cells.touched[scratch, 0] = slot
     cells.touched[scratch, 1] = column + cells.corner[0]
     cells.touched[scratch, 2] = row + cells.corner[1]
-    cells.touched[scratch, 3] = born
+    cells.touched[scratch, 3] = new
     cells.scratch_of[slot] = scratch
     for j in range(SIDE):
         for i in range(SIDE):
@@ -74,7 +67,7 @@ def _rasterise_point(  # noqa: PLR0913 (kernel)
     cov: tuple[float, float, float],
     faced: int,
     ends: float,
-    bell: NDArray[np.float32],
+    bell: Float32,
 ) -> bool:
     """Gaussian with covariance ``cov`` (xx, xy, yy) about (u, v), in cells."""
     a, b, d = cov
@@ -124,7 +117,7 @@ def _rasterise_stretch(  # noqa: PLR0913 (kernel)
     variance: float,
     faced: int,
     ends: float,
-    bell: NDArray[np.float32],
+    bell: Float32,
 ) -> bool:
     """Gaussian ridge about the stretch from (u, v) to (u + du, v + dv), in cells."""
     square = du * du + dv * dv
@@ -160,12 +153,7 @@ def _rasterise_stretch(  # noqa: PLR0913 (kernel)
 
 @inner
 def _moved(
-    points_robot: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    pose: NDArray[np.float64],
-    cell: float,
-    points: NDArray[np.float64],
-    box: NDArray[np.float64],
+    points_robot: Float, covariances: Float, pose: Float, cell: float, points: Float, box: Float
 ) -> None:
     """``points`` in the map frame, and the ``box`` (xmin, ymin, xmax, ymax) of their Gaussians."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
@@ -185,7 +173,7 @@ def _moved(
 
 
 @inner
-def _is_covered(cells: Cells, box: NDArray[np.float64], size: float) -> bool:
+def _is_covered(cells: Cells, box: Float, size: float) -> bool:
     """Whether the directory has the blocks, ``size`` m wide, of the box and those around it."""
     rows, columns = cells.directory.shape
     cx, cy = cells.corner[0], cells.corner[1]
@@ -197,24 +185,24 @@ def _is_covered(cells: Cells, box: NDArray[np.float64], size: float) -> bool:
 @uncounted
 def _stamp(  # noqa: PLR0913 (kernel)
     arrays: tuple[Any, ...],
-    points_robot: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    facings: NDArray[np.uint8],
-    pose: NDArray[np.float64],
+    points_robot: Float,
+    covariances: Float,
+    joined: Bools,
+    facings: Bytes,
+    pose: Float,
     cell: float,
     ends: float,
-    bell: NDArray[np.float32],
+    bell: Float32,
     start: int,
-    points: NDArray[np.float64],
-    box: NDArray[np.float64],
+    points: Float,
+    box: Float,
 ) -> int:
     """Raise I around the points, seen from ``pose``, from ``start`` on; ``arrays`` of ``Cells``.
 
     Returns the index of the point at which room ran out, n where it did not, and -1 where the
     directory does not cover the ``box`` (4,). ``points`` (n, 2) and that box are filled first.
     """
-    cells = named(arrays)
+    cells = Cells(*arrays)
     if start == 0:
         _moved(points_robot, covariances, pose, cell, points, box)
         if not _is_covered(cells, box, SIDE * cell):
@@ -224,9 +212,8 @@ def _stamp(  # noqa: PLR0913 (kernel)
     scale = 1.0 / (cell * cell)
     for k in range(start, len(points)):
         xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
-        a = (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale
-        b = (c * s * (xx - yy) + (c * c - s * s) * xy) * scale
-        d = (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale
+        a, b, d = rotate(c, s, xx, xy, yy)
+        a, b, d = a * scale, b * scale, d * scale
         u, v = points[k, 0] / cell - 0.5, points[k, 1] / cell - 0.5
         faced = turned_face(facings[k], theta)
         if not _rasterise_point(cells, u, v, (a, b, d), faced, ends, bell):

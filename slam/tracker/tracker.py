@@ -2,9 +2,10 @@
 """A SLAM on a map of cells, whatever the map: scan matching, uncertainty, relocalisation, loops."""
 
 import abc
+import functools
+import gc
 import math
 from collections.abc import Callable, Mapping
-from functools import partial
 from pathlib import Path
 from typing import Any, ClassVar, Self
 
@@ -12,13 +13,16 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam import se2
+from slam._jit import announced
+from slam.arrays import Float, Float32
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Estimate
-from slam.frames import Float, Frame, Odometry
+from slam.frames import Frame, Odometry
 from slam.frontend.observations import Observations, observe
 from slam.frontend.odometry_prior import Prediction, turned
 from slam.path import PosePath
 from slam.tracker import map_file as memory
+from slam.tracker import warmup
 from slam.tracker.belief.belief import Belief, Judged
 from slam.tracker.belief.places import coarse
 from slam.tracker.belief.state import State
@@ -27,12 +31,12 @@ from slam.tracker.cells import MOST_OFF
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
+from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
-from slam.tracker.uncertainty.residuals import Evidence, look
-from slam.tracker.warmup import warm_up
+from slam.tracker.uncertainty.residuals import Residuals, residuals_of
 from slam.trajectory import Trajectory
 
 
@@ -54,9 +58,23 @@ class Tracker(abc.ABC):
 
     @classmethod
     def _get_ready(cls) -> None:
-        """Compile, the first time in a process."""
-        # mypy takes a class of dataclasses for unhashable
-        warm_up(cls.config_class, cls._new_map, cls._new_submap)  # type: ignore[arg-type]
+        """Compile, the first time in a process; a class without a config of its own as its base."""
+        ours = (kind for kind in cls.__mro__ if issubclass(kind, Tracker))
+        next(kind for kind in ours if "config_class" in vars(kind))._rehearse()
+
+    @classmethod
+    @functools.cache
+    def _rehearse(cls) -> None:
+        """Run every kernel once on a little room."""
+        slam = cls.__new__(cls)
+        slam.config = cls.config_class(cell_m=0.2, standing=StandingConfig(thin_m=0.0))
+        with announced("the SLAM's kernels", warmup.COMPILE_S):
+            slam.reset()
+            for k in range(4):
+                slam.update(warmup.frame(k))
+            warmup.search(slam.cell_map, slam._new_submap(slam.config), slam._matcher)
+        gc.collect()
+        gc.freeze()  # the compiler's objects stay: looking through them takes 100 ms of a scan
 
     def reset(self) -> None:
         """Forget everything; the next frame is the origin of the map."""
@@ -69,7 +87,7 @@ class Tracker(abc.ABC):
         self._standing = Standing(self.config.standing)
         self._believe(self._matcher.match)
         new_map = self._map_anew if self.map_moves else None
-        new_submap = partial(self._new_submap, self.config)
+        new_submap = functools.partial(self._new_submap, self.config)
         self._loops = Loops(self.config, self._matcher, new_submap, new_map)
         self._trusted = True  # the pose of the frame before
         self._path = PosePath()
@@ -106,12 +124,12 @@ class Tracker(abc.ABC):
         self._correct()
         prediction = self._predict(frame.odometry)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
-        observations = self._standing.with_votes(
+        observations = self._standing.weighted(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
         )
         judged = self._judge(observations, prediction)  # 3 Eq. (13), and whether it is believed
-        evidence = self._update_map(observations, judged)  # 4 residuals, then 5 Eq. (8)
-        trust = self._update_uncertainty(observations, judged, evidence)  # 6 pose, odometry noise
+        residuals = self._update_map(observations, judged)  # 4 residuals, then 5 Eq. (8)
+        trust = self._update_uncertainty(observations, judged, residuals)  # 6 pose, odometry noise
         self._add_to_path(observations, judged)  # 7 key frames for loops
         match, state = judged.match, judged.state
         if state is State.TRACKING or not self._belief.certain:
@@ -176,7 +194,7 @@ class Tracker(abc.ABC):
         before.
         """
         relocalise = self.config.tracking.relocalise
-        if observations.weight >= relocalise.least_weight:
+        if observations.amount >= relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
             prediction = prediction.changed(carried=self._pose_covariance.odometry_part(motion))
         judged = self._belief.judge(self.cell_map, observations, prediction)
@@ -185,7 +203,7 @@ class Tracker(abc.ABC):
             self._pose_covariance.relocated(coarse(relocalise))
         return judged
 
-    def _update_map(self, observations: Observations, judged: Judged) -> Evidence | None:
+    def _update_map(self, observations: Observations, judged: Judged) -> Residuals | None:
         """Let the map see the frame, where the pose is believed.
 
         Returns what the observed surfaces said about it before, where the robot was tracked to it.
@@ -193,12 +211,14 @@ class Tracker(abc.ABC):
         """
         match, elapsed = judged.match, judged.prediction.elapsed
         T_map_robot, step = match.T_map_robot, min(elapsed, self.config.map.longest_look_s)
-        tracked, evidence = judged.state is State.TRACKING, None
+        tracked, residuals = judged.state is State.TRACKING, None
         if tracked or judged.followed:
             short_term, turn = self._matcher.reward.short_term, self._loops.n_frames
             times = step, self._pose_covariance.unseen_s
-            evidence = look(self.cell_map, short_term, observations, T_map_robot, times, turn)
-        old = np.zeros(6) if evidence is None else evidence.old
+            residuals = residuals_of(
+                self.cell_map, short_term, observations, T_map_robot, times, turn
+            )
+        old = np.zeros(6) if residuals is None else residuals.old
         self._standing.agreement.hold(old, elapsed)
         if judged.writes:
             self.cell_map.off_cm = math.ceil(min(100.0 * self._pose_covariance.off_m, MOST_OFF))
@@ -207,10 +227,10 @@ class Tracker(abc.ABC):
             self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
             if tracked:
                 self._belief.learn(judged)
-        return evidence if tracked else None
+        return residuals if tracked else None
 
     def _update_uncertainty(
-        self, observations: Observations, judged: Judged, evidence: Evidence | None
+        self, observations: Observations, judged: Judged, residuals: Residuals | None
     ) -> float:
         """Returns how far the matched returns are trusted, in [0, 1]."""
         match, prediction = judged.match, judged.prediction
@@ -218,10 +238,10 @@ class Tracker(abc.ABC):
         lasting, now = agreement.left_behind(), agreement.covariance()
         if match.slipped:  # found by a search, among what does not fit there
             lasting = (1.0 - match.overlapped) * coarse(self.config.tracking.relocalise)
-        self._pose_covariance.update(self._T_map_robot, prediction, match, evidence)
+        self._pose_covariance.update(self._T_map_robot, prediction, match, residuals)
         matched = match.tau > 0.0 and not match.slipped
-        if evidence is not None and matched:
-            self._pose_covariance.held(agreement.shown, evidence.old_off_m2, prediction.elapsed)
+        if residuals is not None and matched:
+            self._pose_covariance.held(agreement.shown, residuals.old_off_m2, prediction.elapsed)
         self._pose_covariance.dragged(lasting, now)
         if judged.followed and judged.state is not State.RELOCATED and not match.slipped:
             self._odometry_noise.note_slip(prediction, match)
@@ -232,7 +252,7 @@ class Tracker(abc.ABC):
             self._odometry_noise.learn(prediction, match, sigma_m, along_rad)
         else:
             self._odometry_noise.nis = None
-        return observations.mean_vote
+        return observations.mean_weight
 
     def _add_to_path(self, observations: Observations, judged: Judged) -> None:
         """For closing loops: motion as matched, or by odometry where an end of it is uncertain."""
@@ -293,9 +313,7 @@ class Tracker(abc.ABC):
         self._T_map_robot = self._T_map_robot + by
         self._T_map_robot[2] = se2.wrap(float(self._T_map_robot[2]))
 
-    def window(
-        self, xmin: float, ymin: float, xmax: float, ymax: float
-    ) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+    def window(self, xmin: float, ymin: float, xmax: float, ymax: float) -> tuple[Float32, Float32]:
         """Dense short-term x and long-term y of the cells centred in the rectangle (map, m)."""
         return self.cell_map.window(xmin, ymin, xmax, ymax)
 

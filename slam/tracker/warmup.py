@@ -1,97 +1,54 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Get the kernels of an ordinary scan ready before the first frame, so that none waits for them.
+"""A little room in which a tracker's kernels run before the first frame, so that none waits.
 
-Those of the searches too: a robot that is lost has no more time than another.
+Those of searches and loops too: a robot that is lost has no more time than another.
 
 Compiled code is cached on disk: the seconds are spent once after an installation, or in every
 process where no folder for the cache can be written.
 """
 
-import functools
-import gc
-from collections.abc import Callable
-from typing import Any
-
 import numpy as np
 
-from slam._jit import announced
-from slam.frames import NS_PER_S, LaserSpec, Odometry, Scan
-from slam.frontend.heading_bias import HeadingBias
-from slam.frontend.motions import extended
-from slam.frontend.observations import Observations, from_scan
-from slam.frontend.odometry_prior import inverted, predict, squared, turned
+from slam.frames import NS_PER_S, Frame, LaserSpec, Odometry, Scan
+from slam.frontend.observations import observe
 from slam.posegraph import Edge, optimise
 from slam.tracker.cell_map import CellMap
-from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.matching.whole_search import WholeSearch
-from slam.tracker.rasterise import rasterise
-from slam.tracker.standing.config import StandingConfig
-from slam.tracker.standing.recent import Standing
-from slam.tracker.uncertainty.covariances import carried, followed, observable
-from slam.tracker.uncertainty.odometry_noise import compared
-from slam.tracker.uncertainty.residuals import look
+from slam.tracker.rasterise import rasterise, seen_at
+from slam.tracker.uncertainty.covariances import carried, observable
 
 COMPILE_S = 10.0  # of one core of a Xeon, measured
+SPEC = LaserSpec(n_beams=9, angle_min=-1.0, angle_increment=0.25)
+RANGES = np.array([2.0, 2.0, 2.0, 1.0, 3.0, 3.0, 2.0, 2.0, np.inf], np.float32)
 
 
-@functools.cache
-def warm_up(config_class: type[TrackerConfig], *new_maps: Callable[[Any], CellMap]) -> None:
-    """Run every kernel of an ordinary scan once on a little room, the first time in a process.
-
-    ``new_maps`` make the map of a SLAM, and those of its loops, whose own kernels run as well.
-    """
-    with announced("the SLAM's kernels", COMPILE_S):
-        config = config_class(cell_m=0.2)
-        _run_all(config, *(new_map(config) for new_map in new_maps))
-    gc.collect()
-    gc.freeze()  # the compiler's objects stay: looking through them again takes 100 ms of a scan
+def frame(k: int) -> Frame:
+    """The room as a robot that rests sees it for the k-th time, 10 times a second."""
+    stamp_ns, spread = k * NS_PER_S // 10, np.diag([0.1, 0.1, 0.1])
+    return Frame(
+        stamp_ns=stamp_ns,
+        odometry=Odometry(stamp_ns=stamp_ns, T_odom_robot=np.zeros(3), increment_covariance=spread),
+        scan=Scan(stamp_ns=stamp_ns, ranges=RANGES, spec=SPEC),
+    )
 
 
-def _run_all(config: TrackerConfig, cell_map: CellMap, *others: CellMap) -> None:
-    spec = LaserSpec(n_beams=9, angle_min=-1.0, angle_increment=0.25)
-    ranges = np.array([2.0, 2.0, 2.0, 1.0, 3.0, 3.0, 2.0, 2.0, np.inf], np.float32)
-    matcher, origin, covariance = Matcher(config), np.zeros(3), np.diag([0.1, 0.1, 0.1])
-    seen = from_scan(Scan(stamp_ns=0, ranges=ranges, spec=spec), np.zeros(3), config)
-    look(cell_map, 0.3, seen, origin, (1.0, 0.0), 0)
-    times = (1.0, 1.0, 1.0, 1.0)
-    followed(
-        np.eye(3), np.eye(3), np.eye(3), np.eye(3), origin, origin, covariance, covariance,
-        (1.0, 0.0, 1.0, 1.0, 1.0), times, times, np.eye(3),
-    )  # fmt: skip
-    carried(covariance, origin, 0.0, 0.0, np.eye(3))
-    observable(covariance, 0.0, 2.0, np.eye(3))
-    still = [
-        Odometry(stamp_ns=k, T_odom_robot=origin, increment_covariance=covariance) for k in (0, 1)
-    ]
-    prior = predict(origin, still[0], still[1]).covariance
-    squared(origin, turned(prior, 0.1))
-    HeadingBias().learn(origin, 1.0, (1.0, 1.0), (1.0, 0.0, prior))
-    extended(np.zeros(3), np.eye(3), origin, prior)
-    compared(prior, prior, prior, prior, 0.0, prior, origin, 1.0, (0.0, 0.0))
-    for one in (cell_map, *others):
-        for write in (False, True):
-            rasterise(one, seen, origin)
-            one.integrate(seen.view, origin, 1.0, write=write)
-        one.release()
-    standing = Standing(StandingConfig(thin_m=0.0))
-    standing.add(0, origin, seen)
-    standing.with_votes(NS_PER_S // 2, origin, covariance, seen)
-    start = matcher.approach(cell_map, seen, origin, covariance)
-    matcher.climb(cell_map, seen, start, origin, inverted(covariance))
-    _search(cell_map, matcher, seen)
-    cell_map.window(0.0, 0.0, 1.0, 1.0)
-    optimise(np.zeros((2, 3)), [Edge(a=0, b=1, T_a_b=origin, information=np.eye(3))])
-
-
-def _search(cell_map: CellMap, matcher: Matcher, seen: Observations) -> None:
-    """Run the kernels of both searches."""
+def search(cell_map: CellMap, submap: CellMap, matcher: Matcher) -> None:
+    """Run the kernels of searches and loops, which an ordinary scan does not need."""
+    seen = observe(frame(0), np.zeros(3), matcher.config)
     window = SearchWindow(reach_m=0.2, turn_rad=0.1)
     matcher.search(cell_map, seen, np.zeros(3), np.eye(3), window)
-    coarse = CoarseMap(cell_map, 0.3)
-    search = WholeSearch(coarse, seen.points_robot, 1, matcher.config.matching.whole)
-    while not search.done:
-        search.advance(Budget(matcher.config.matching.budget, 1.0))
+    numbers, coarse = matcher.config.matching, CoarseMap(cell_map, 0.3)
+    whole = WholeSearch(coarse, seen.points_robot, 1, numbers.whole)
+    while not whole.done:
+        whole.advance(Budget(numbers.budget, 1.0))
+    seen_at(submap, seen, np.zeros(3))
+    rasterise(submap, seen, np.zeros(3))
+    submap.integrate(seen.view, np.zeros(3), 1.0, write=True)
+    cell_map.window(0.0, 0.0, 1.0, 1.0)
+    carried(np.eye(3), np.zeros(3), 0.0, 0.0, np.eye(3))
+    observable(np.eye(3), 0.0, 2.0, np.eye(3))
+    optimise(np.zeros((2, 3)), [Edge(a=0, b=1, T_a_b=np.zeros(3), information=np.eye(3))])

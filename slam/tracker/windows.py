@@ -4,8 +4,8 @@
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
+from slam.arrays import Float32, Int32, Ints
 from slam.tracker.cells import SHIFT, SIDE, Cells
 
 
@@ -18,13 +18,13 @@ class Window(NamedTuple):
     cells          which of their cells are its own
     """
 
-    slots: NDArray[np.int32]
-    rows: NDArray[np.int64]
-    columns: NDArray[np.int64]
+    slots: Int32
+    rows: Ints
+    columns: Ints
     blocks: tuple[int, int]
     cells: tuple[slice, slice]
 
-    def spread(self, values: NDArray[np.float32], fill: float, n: int = 1) -> NDArray[np.float32]:
+    def spread(self, values: Float32, fill: float, n: int = 1) -> Float32:
         """The rectangle's cells from ``values`` (n, 8, 8) of its blocks, else ``fill``.
 
         n  so many cells a side are one, the largest of them; of whole blocks
@@ -57,9 +57,7 @@ def window(cells: Cells, i0: int, j0: int, shape: tuple[int, int]) -> Window:
     return Window(slots[a, b], a + low, b + first, blocks, own)
 
 
-def dense(
-    cells: Cells, i0: int, j0: int, shape: tuple[int, int]
-) -> tuple[NDArray[np.float32], NDArray[np.float32]]:
+def dense(cells: Cells, i0: int, j0: int, shape: tuple[int, int]) -> tuple[Float32, Float32]:
     """x and y of cells (i0 + column, j0 + row), 0 where nothing lives."""
     found = window(cells, i0, j0, shape)
     return (

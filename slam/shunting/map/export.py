@@ -3,13 +3,13 @@
 
 import cv2
 import numpy as np
-from numpy.typing import NDArray
 
+from slam.arrays import Bools, Float32
 from slam.estimate import Changes, Raster
 from slam.tracker.network import Network
 from slam.tracker.windows import Window, window
 
-Blocks = NDArray[np.float32]  # (n, 8, 8)
+Blocks = Float32  # (n, 8, 8)
 
 
 def existence(network: Network) -> Raster | None:
@@ -47,9 +47,7 @@ def changes(network: Network) -> Changes | None:
     return Changes(appeared=appeared, gone=gone)
 
 
-def _beyond(
-    found: Window, one: Blocks, other: Blocks, silent: NDArray[np.bool_], reach: int
-) -> NDArray[np.float32]:
+def _beyond(found: Window, one: Blocks, other: Blocks, silent: Bools, reach: int) -> Float32:
     """How much more ``one`` is than the largest of ``other`` within ``reach`` neurons: a wall seen
     one neuron aside is no change. NaN where ``silent`` and where no neuron lives."""
     square = np.ones((2 * reach + 1, 2 * reach + 1), np.uint8)

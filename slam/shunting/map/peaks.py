@@ -5,11 +5,10 @@ import math
 from dataclasses import dataclass
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frames import Float
-from slam.tracker.cells import MASK, SHIFT, SIDE, Cells
+from slam.arrays import Float
+from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, activity, slot_of
 from slam.tracker.network import Network
 
 MOST = 1 << 14  # peaks returned at most
@@ -17,27 +16,13 @@ MOST = 1 << 14  # peaks returned at most
 
 @inner
 def _value(cells: Cells, short: float, i: int, j: int) -> float:
-    """v = y + (1 - y) short x of neuron (i, j), what the matcher sees; 0 where no block lives."""
-    row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
-    rows, columns = cells.directory.shape
-    if row < 0 or column < 0 or row >= rows or column >= columns:
-        return 0.0
-    slot = cells.directory[row, column]
-    if slot < 0:
-        return 0.0
-    y = cells.y[slot, j & MASK, i & MASK]
-    return float(y + (1.0 - y) * short * cells.x[slot, j & MASK, i & MASK])
+    """What the matcher sees of neuron (i, j); 0 where no block lives."""
+    slot = slot_of(cells, i, j)
+    return float(activity(cells, short, slot, j & MASK, i & MASK)) if slot >= 0 else 0.0
 
 
 @inner
-def _age(cells: Cells, i: int, j: int) -> float:
-    """Of the living neuron (i, j), s."""
-    slot = cells.directory[(j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]]
-    return float(cells.age[slot, j & MASK, i & MASK])
-
-
-@inner
-def _spread(near: NDArray[np.float64], own: float, out: NDArray[np.float64]) -> None:
+def _spread(near: Float, own: float, out: Float) -> None:
     """Covariance xx, xy, yy (cells^2) of a bell beyond the lattice's ``own`` width, into ``out``.
 
     ``near`` (3, 3) are the logarithms of the neuron and its neighbours: their second differences
@@ -84,10 +69,10 @@ def _peaks(  # noqa: PLR0913 (kernel)
     cell: float,
     short: float,
     least: float,
-    centre: NDArray[np.float64],
+    centre: Float,
     reach: float,
     own: float,
-    out: NDArray[np.float64],
+    out: Float,
 ) -> int:
     """Fill ``out`` (most, 7) with x, y, height, spread xx, xy, yy and age; how many there are."""
     count = 0
@@ -121,7 +106,8 @@ def _peaks(  # noqa: PLR0913 (kernel)
                 out[count, 1] = (j + 0.5 + _between(near[0, 1], near[1, 1], near[2, 1])) * cell
                 out[count, 2] = here
                 _spread(near, own, out[count, 3:6])
-                out[count, 6] = _age(cells, i, j)
+                slot = cells.directory[row, column]
+                out[count, 6] = cells.age[slot, j & MASK, i & MASK]
                 count += 1
     return count
 

@@ -14,11 +14,11 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
 from slam.tracker.belief.doubt import Doubt
-from slam.tracker.belief.likelihood import MOST_NATS, carried, probabilities, sum_of, told
+from slam.tracker.belief.likelihood import MOST_NATS, carried, evidence, probabilities, sum_of
 from slam.tracker.belief.places import Place, novelty, spread
 from slam.tracker.belief.state import State
 from slam.tracker.cell_map import CellMap
@@ -34,7 +34,7 @@ LEAST_IN_VIEW = 0.6  # share: who was carried sees little of what was in view; s
 ENOUGH = 0.5  # of the novelty of a place far away, before it is taken; set by hand
 
 
-@dataclass(frozen=True, kw_only=True, eq=False)
+@dataclass(frozen=True, eq=False)
 class Judged:
     """What is to be done with a scan.
 
@@ -107,7 +107,7 @@ class Belief:
         local = cell_map if doubt is None else doubt.local
         match = near(self._match(observations, prediction, local), prediction)
         if prediction.elapsed <= OFTEN_S:
-            self._agreement.take(prediction, match.T_map_robot, observations.mean_vote)
+            self._agreement.take(prediction, match.T_map_robot, observations.mean_weight)
             match = self._undragged(cell_map, observations, match)
         share = self._matcher.usual.share(match, observations)
         least = config.tracking.relocalise.goes_on
@@ -115,7 +115,7 @@ class Belief:
         if doubt is None and odd and per_h > 0.0:
             doubt = Doubt(cell_map, self._matcher)
         if doubt is not None:
-            doubt.told = doubt.places.told(self._on_map(doubt, observations, match))
+            doubt.evidence = doubt.places.evidence(self._on_map(doubt, observations, match))
         goes_on, nats = self._going_on(doubt, observations, match, share)
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_LOST)
         if goes_on:
@@ -154,18 +154,18 @@ class Belief:
         Against it no more than by what it sees through: what is hidden denies nothing.
         """
         config = self._matcher.config
-        if observations.weight < config.tracking.relocalise.least_weight:
+        if observations.amount < config.tracking.relocalise.least_weight:
             return True, 0.0
-        nats = told(config.belief, share)
+        nats = evidence(config.belief, share)
         if doubt is None:
             return True, max(nats, 0.0)
         look = seen_at(doubt.cell_map, observations, match.T_map_robot)
         denied_m = look.through - config.belief.hidden_m
         seen = self._matcher.usual.share(match, observations, LEAST_IN_VIEW)
         if seen < config.tracking.relocalise.goes_on and denied_m > look.known:
-            nats = min(nats, doubt.told)  # the map denies more than it explains
+            nats = min(nats, doubt.evidence)  # the map denies more than it explains
         elif self._unknown > 0.0:  # who was carried away goes on from scans there, too
-            nats = min(nats, max(doubt.told, 0.0))
+            nats = min(nats, max(doubt.evidence, 0.0))
         if nats >= 0.0:
             return True, nats
         return False, max(nats, -config.belief.hidden * max(denied_m, 0.0))
@@ -174,7 +174,7 @@ class Belief:
         """What a match to the copy is on the map of before the doubt."""
         if doubt.local is doubt.cell_map:
             return match
-        there, everyone = match.T_map_robot, observations.with_votes(None)
+        there, everyone = match.T_map_robot, observations.weighted(None)
         return self._matcher.climb(doubt.cell_map, everyone, there, there, STILL)
 
     def _blind(self, cell_map: CellMap, prediction: Prediction) -> Judged:
@@ -184,10 +184,8 @@ class Belief:
             doubt.match = match
             doubt.places.wait(prediction)
         self._weigh(doubt)
-        return Judged(
-            match=match, prediction=prediction, state=State.BLIND, cell_map=cell_map,
-            writes=doubt is None, followed=False,
-        )  # fmt: skip
+        writes = doubt is None
+        return Judged(match, prediction, State.BLIND, cell_map, writes=writes, followed=False)
 
     def learn(self, judged: Judged) -> None:
         """The map took a scan in."""
@@ -195,10 +193,7 @@ class Belief:
 
     def _settled(self, cell_map: CellMap, match: Match, prediction: Prediction) -> Judged:
         self._doubt = None
-        tracking = State.TRACKING
-        return Judged(
-            match=match, prediction=prediction, state=tracking, cell_map=cell_map, writes=True
-        )
+        return Judged(match, prediction, State.TRACKING, cell_map, writes=True)
 
     def _weigh(self, doubt: Doubt | None) -> None:
         """Probabilities of the places that are followed, and of not being where motion led."""
@@ -214,11 +209,11 @@ class Belief:
         self, doubt: Doubt, observations: Observations, prediction: Prediction, goes_on: bool
     ) -> Judged:
         """Other places are asked, and one is taken if it is certain."""
-        config, everyone = self._matcher.config, observations.with_votes(None)
+        config, everyone = self._matcher.config, observations.weighted(None)
         prices, frozen_above = config.matching.budget, config.belief.frozen_above
         lost = self.p_lost > 0.5 or not goes_on
         budget = Budget(prices, prices.lost_share if lost else prices.frozen_share)
-        if everyone.weight >= config.tracking.relocalise.least_weight:
+        if everyone.amount >= config.tracking.relocalise.least_weight:
             doubt.places.follow(everyone, prediction, budget)
         else:
             doubt.places.wait(prediction)
@@ -238,10 +233,7 @@ class Belief:
         if goes_on:
             doubt.write(observations, doubt.match.T_map_robot, prediction.elapsed)
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
-        return Judged(
-            match=doubt.match, prediction=prediction, state=state, cell_map=doubt.cell_map,
-            followed=goes_on,
-        )  # fmt: skip
+        return Judged(doubt.match, prediction, state, doubt.cell_map, followed=goes_on)
 
     def _nearby(
         self, doubt: Doubt, everyone: Observations, prediction: Prediction, budget: Budget
@@ -249,12 +241,12 @@ class Belief:
         """The best place as far around as a slip may have led."""
         numbers = self._matcher.config.tracking.relocalise
         doubt.since_near_s += prediction.elapsed
-        if doubt.since_near_s < numbers.again_near_s or everyone.weight < numbers.least_near:
+        if doubt.since_near_s < numbers.again_near_s or everyone.amount < numbers.least_near:
             return None
         doubt.since_near_s, self.busy = 0.0, max(self.busy, 0.5)
         every = max(1, len(everyone.points_robot) // numbers.near_points)
-        points, weights = everyone.points_robot[::every], everyone.weights[::every] * every
-        few = replace(everyone, points_robot=points, weights=weights)
+        points, shares = everyone.points_robot[::every], everyone.shares[::every] * every
+        few = replace(everyone, points_robot=points, shares=shares)
         turn = min(math.pi, max(numbers.near_rad, numbers.near_rad_s * prediction.elapsed))
         loose = inverted(spread(numbers.near_m, turn))
         window = SearchWindow(reach_m=numbers.near_m, turn_rad=turn)
@@ -269,8 +261,8 @@ class Belief:
         """Whether the robot slipped to a place nearby, which is certain against one that the map
         does not know, too.
         """
-        config, nats = self._matcher.config.belief, doubt.places.told(found)
-        p = probabilities([0.0, self._unknown, nats - doubt.told + math.log(config.slips)])[2]
+        config, nats = self._matcher.config.belief, doubt.places.evidence(found)
+        p = probabilities([0.0, self._unknown, nats - doubt.evidence + math.log(config.slips)])[2]
         sure = min(p, probabilities([0.0, nats])[1]) >= 1.0 - config.frozen_above
         return sure and gain_m(doubt.cell_map, everyone, found, doubt.match) >= config.more_m
 
@@ -282,7 +274,7 @@ class Belief:
         asked = place.scans >= config.again and novelty(place.way) >= ENOUGH
         explained = place.latest > 0.0 and place.waited == 0
         broken = self._unknown > 0.0 or not goes_on
-        better = probabilities([0.0, place.latest - doubt.told])[1] >= 1.0 - config.frozen_above
+        better = probabilities([0.0, place.latest - doubt.evidence])[1] >= 1.0 - config.frozen_above
         if not (asked and explained and better and broken):
             return False
         return gain_m(doubt.cell_map, everyone, place.match, doubt.match) >= config.far_m
@@ -292,18 +284,13 @@ class Belief:
         numbers = self._matcher.config.tracking.relocalise
         wide = replace(prediction, covariance=spread(numbers.near_m, numbers.near_rad))
         self._found()
-        return Judged(
-            match=replace(found, slipped=True), prediction=wide, state=State.TRACKING, writes=True,
-            cell_map=doubt.cell_map,
-        )  # fmt: skip
+        slipped = replace(found, slipped=True)
+        return Judged(slipped, wide, State.TRACKING, doubt.cell_map, writes=True)
 
     def _relocated(self, doubt: Doubt, place: Place, prediction: Prediction) -> Judged:
         """The robot is at a place far away."""
         self._found()
-        return Judged(
-            match=place.match, prediction=prediction, state=State.RELOCATED,
-            cell_map=doubt.cell_map,
-        )  # fmt: skip
+        return Judged(place.match, prediction, State.RELOCATED, doubt.cell_map)
 
     def _found(self) -> None:
         self._doubt, self.p_lost, self._unknown = None, 0.0, -MOST_NATS

@@ -9,7 +9,7 @@ the map. If the robot turns out to be where its motion led, the copy is the map 
 import math
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.observations import Observations
 from slam.tracker.belief.places import Places
 from slam.tracker.cell_map import CellMap
@@ -27,7 +27,7 @@ class Doubt:
     places        where else the robot may be
     match         of the latest scan at the place that motion led to
     shares        probabilities of ``places.followed``
-    told          nats of that scan there, on the map as it was before
+    evidence      nats of that scan there, on the map as it was before
     since_near_s  since a slip was searched for
     """
 
@@ -36,7 +36,7 @@ class Doubt:
         self.places = Places(cell_map, matcher)
         self.match: Match = unmatched(se2.IDENTITY, matched=0.0, score=0.0)
         self.shares: list[float] = []
-        self.told, self.since_near_s = 0.0, math.inf
+        self.evidence, self.since_near_s = 0.0, math.inf
 
     @property
     def local(self) -> CellMap:

@@ -12,7 +12,7 @@ ENDS = 0.02  # share at either end: no scan says more than a logit(ENDS / (1 + E
 MOST_NATS = 700.0  # exp of less is no zero
 
 
-def told(config: BeliefConfig, share: float) -> float:
+def evidence(config: BeliefConfig, share: float) -> float:
     """Nats for where so large a share of the returns is explained: a logit(s) + b, bounded."""
     s = min(max(share, 0.0), 1.0)
     return config.slope * math.log((s + ENDS) / (1.0 + ENDS - s)) + config.known

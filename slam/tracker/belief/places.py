@@ -9,15 +9,16 @@ are matched by turns.
 
 import math
 from dataclasses import dataclass, field, replace
+from typing import Any
 
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.observations import Observations
-from slam.frontend.odometry_prior import Prediction, inverted, turned
+from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.belief.config import RelocaliseConfig
-from slam.tracker.belief.likelihood import told
+from slam.tracker.belief.likelihood import evidence
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
@@ -50,7 +51,7 @@ class Place:
     """One where the robot may be.
 
     match    of the latest scan that was matched there, carried on by odometry
-    told     nats of all scans that were, for this place against none that is known, each by what
+    evidence nats of all scans that were, for this place against none that is known, each by what
              was new of it; ``anew``: how many new ones they are
     latest   nats of the latest of them
     scans    that were matched there; ``way`` (3,) m, rad and s moved since the first of them
@@ -61,7 +62,7 @@ class Place:
     """
 
     match: Match
-    told: float = 0.0
+    evidence: float = 0.0
     anew: float = 1.0
     latest: float = 0.0
     lag: float = 0.0
@@ -74,7 +75,12 @@ class Place:
     @property
     def nats(self) -> float:
         """Of the place: after a few new scans, more of them see the same surfaces again."""
-        return self.told / self.anew * min(self.anew, MOST_ANEW) - self.lag
+        return self.evidence / self.anew * min(self.anew, MOST_ANEW) - self.lag
+
+    def asked_again(self, new: float, nats: float, **changes: Any) -> "Place":
+        """After one more scan, so much of which is new; with other ``changes``."""
+        evidence, anew = self.evidence + new * nats, self.anew + new
+        return replace(self, evidence=evidence, anew=anew, **changes)
 
     def is_at(self, T_map_robot: Float, config: RelocaliseConfig) -> bool:
         """Whether that is the same place."""
@@ -147,10 +153,10 @@ class Places:
         least = kept[0].nats - self._matcher.config.belief.hopeless if kept else 0.0
         self.followed = [one for one in kept if one.nats >= least][: self._config.most]
 
-    def told(self, match: Match) -> float:
+    def evidence(self, match: Match) -> float:
         """Nats of a scan matched to the map, against a place that the map does not know."""
         config, usual = self._matcher.config.belief, max(self._matcher.usual.match, LEAST)
-        return told(config, match.overlapped / usual) - config.new
+        return evidence(config, match.overlapped / usual) - config.new
 
     def _go_on(self, prediction: Prediction) -> None:
         """The robot has moved on since the scan that is searched for."""
@@ -187,19 +193,18 @@ class Places:
             match = self._climb(observations, here, covariance, budget)
             few = min(len(observations.points_robot), self._matcher.numbers.climb.few)
             budget.spend(self._prices.approach_ns * few)
-            nats = self.told(match)
-            new.append(Place(match=match, told=nats, latest=nats))
+            nats = self.evidence(match)
+            new.append(Place(match=match, evidence=nats, latest=nats))
             self.searches += self._search is None and not self._found
         return new
 
     def _matched(self, moved: Place, observations: Observations, budget: Budget) -> Place:
         """A scan says the less the less the robot has moved since the one before."""
         match = self._climb(observations, moved.match.T_map_robot, moved.drift, budget)
-        latest, new = self.told(match), novelty(moved.asked)
-        return replace(
-            moved, match=match, told=moved.told + new * latest, anew=moved.anew + new,
-            latest=latest, scans=moved.scans + 1, asked=np.zeros(3), waited=0,
-            drift=np.zeros((3, 3)),
+        latest, new = self.evidence(match), novelty(moved.asked)
+        return moved.asked_again(
+            new, latest, match=match, latest=latest, scans=moved.scans + 1, asked=np.zeros(3),
+            waited=0, drift=np.zeros((3, 3)),
         )  # fmt: skip
 
     def _waiting(self, old: Place, prediction: Prediction) -> Place:
@@ -222,9 +227,7 @@ class Places:
         self, observations: Observations, T_map_robot: Float, covariance: Float, budget: Budget
     ) -> Match:
         budget.spend(self._prices.climb_ns * max(len(observations.points_robot), 1))
-        start = self._matcher.approach(self._cell_map, observations, T_map_robot, covariance)
-        precision = inverted(covariance)
-        return self._matcher.climb(self._cell_map, observations, start, T_map_robot, precision)
+        return self._matcher.matched(self._cell_map, observations, T_map_robot, covariance)
 
 
 def novelty(moved: Float) -> float:

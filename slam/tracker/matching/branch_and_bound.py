@@ -12,10 +12,9 @@ import numpy as np
 from llvmlite.ir import IntType
 from numba import uint64
 from numba.extending import intrinsic
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frames import Float
+from slam.arrays import Bytes, Float, Int32, Ints, Words
 
 SPAN = 8  # a block of 8 x 8 offsets is bounded, and scored, at once
 FULL = 257  # bytes of which 16 bits hold the sum
@@ -35,9 +34,9 @@ class Lattice:
     gain       score of a sum of 1
     """
 
-    field: NDArray[np.uint8]
-    ahead: NDArray[np.uint8]
-    bases: NDArray[np.int32]
+    field: Bytes
+    ahead: Bytes
+    bases: Int32
     turns: Float
     reach: int
     pitch: float
@@ -56,7 +55,7 @@ class Found:
     evaluations: int
 
 
-def look_ahead(field: NDArray[np.uint8], ahead: NDArray[np.uint8]) -> NDArray[np.uint8]:
+def look_ahead(field: Bytes, ahead: Bytes) -> Bytes:
     """``ahead``, which is all 0, with the largest of the 8 x 8 values of ``field`` from each one
     on; the last rows and columns have fewer.
 
@@ -68,7 +67,7 @@ def look_ahead(field: NDArray[np.uint8], ahead: NDArray[np.uint8]) -> NDArray[np
 
 @njit
 def _look_ahead(  # noqa: C901 (kernel)
-    field: NDArray[np.uint8], words: NDArray[np.uint64], ahead: NDArray[np.uint8]
+    field: Bytes, words: Words, ahead: Bytes
 ) -> None:
     """``words``: eight values of ``field`` in one, which show at once where nothing is."""
     rows = len(field)
@@ -120,8 +119,8 @@ def _eight(_: Any, array: Any, at: Any) -> Any:
 
 @inner
 def open_block(
-    field: NDArray[np.uint8], flat: NDArray[np.uint64], first: int, columns: int,
-    sums: NDArray[np.int64],
+    field: Bytes, flat: Words, first: int, columns: int,
+    sums: Ints,
 ) -> None:  # fmt: skip
     """``sums`` (8, 8) of ``field``, which is flat and has so many ``columns``, under the points.
 
@@ -145,12 +144,7 @@ def open_block(
 
 @njit
 def _bound(
-    ahead: NDArray[np.uint8],
-    bases: NDArray[np.int32],
-    costs: NDArray[np.float64],
-    reach: int,
-    gain: float,
-    bounds: NDArray[np.float64],
+    ahead: Bytes, bases: Int32, costs: Float, reach: int, gain: float, bounds: Float
 ) -> None:
     """Upper bounds (headings, rows, columns) of the blocks of offsets."""
     columns, cells = ahead.shape[1], ahead.ravel()  # places as in ``open_block``
@@ -167,7 +161,7 @@ def _bound(
 
 
 @inner
-def _first(index: NDArray[np.int64], heading: int, row: int, column: int) -> bool:
+def _first(index: Ints, heading: int, row: int, column: int) -> bool:
     """Whether a candidate comes before that of the index."""
     if heading != index[0]:
         return bool(heading < index[0])
@@ -175,9 +169,7 @@ def _first(index: NDArray[np.int64], heading: int, row: int, column: int) -> boo
 
 
 @inner
-def _cost(
-    precision: NDArray[np.float64], pitch: float, column: int, row: int, turn: float
-) -> float:
+def _cost(precision: Float, pitch: float, column: int, row: int, turn: float) -> float:
     """1/2 e' P^-1 e of a candidate."""
     ex, ey, et = column * pitch, row * pitch, turn
     cross = precision[0, 1] * ex * ey
@@ -189,16 +181,16 @@ def _cost(
 
 @njit
 def _descend(  # noqa: PLR0913 (kernel)
-    field: NDArray[np.uint8],
-    bases: NDArray[np.int32],
-    turns: NDArray[np.float64],
+    field: Bytes,
+    bases: Int32,
+    turns: Float,
     reach: int,
     pitch: float,
-    precision: NDArray[np.float64],
+    precision: Float,
     gain: float,
-    bounds: NDArray[np.float64],
-    order: NDArray[np.int64],
-    index: NDArray[np.int64],
+    bounds: Float,
+    order: Ints,
+    index: Ints,
 ) -> tuple[float, int]:
     """Open blocks in falling ``order`` of their bounds, as long as one may hold a better candidate.
 

@@ -6,12 +6,11 @@ it, from where blurred observations lead and with a weight that falls with the m
 import math
 from typing import Any, NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from slam._jit import inner, uncounted
+from slam.arrays import Float
 from slam.frontend.odometry_prior import inverse, turn
-from slam.tracker.matching.score import Field, Reward, Seen, evaluated
+from slam.tracker.cells import Field
+from slam.tracker.matching.score import Reward, Seen, evaluated
 
 SCRATCH = (19, 3)  # shape of the room that a climb works in: of ``refine``, and two matrices
 
@@ -30,12 +29,7 @@ class Climb(NamedTuple):
 
 
 @inner
-def _prior(
-    pose: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    precision: NDArray[np.float64],
-    slope: NDArray[np.float64],
-) -> float:
+def _prior(pose: Float, prediction: Float, precision: Float, slope: Float) -> float:
     """-1/2 e' P^-1 e with e = pose - prediction (heading wrapped); its gradient in ``slope``."""
     ex, ey = pose[0] - prediction[0], pose[1] - prediction[1]
     et = pose[2] - prediction[2]
@@ -46,9 +40,7 @@ def _prior(
 
 
 @inner
-def _solve(
-    H: NDArray[np.float64], g: NDArray[np.float64], damping: float, step: NDArray[np.float64]
-) -> None:
+def _solve(H: Float, g: Float, damping: float, step: Float) -> None:
     """(H + damping diag H) step = g for a positive definite 3 x 3 H, by Cholesky."""
     grow = 1.0 + damping
     l00 = math.sqrt(H[0, 0] * grow)
@@ -70,19 +62,19 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     reward: Reward,
     climb: Climb,
     seen: Seen,
-    pose: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    precision: NDArray[np.float64],
+    pose: Float,
+    prediction: Float,
+    precision: Float,
     tau: float,
-    information: NDArray[np.float64],
-    scratch: NDArray[np.float64],
+    information: Float,
+    scratch: Float,
 ) -> tuple[float, float, float, float]:
     """Climb to the maximum of tau * reward - 1/2 Mahalanobis^2 from ``pose`` (changed in place).
 
     Newton's method with Levenberg damping; a step is taken only if it rises, but for the last, tiny
     one. The slope of the reward along observed surfaces is left out of it: there it only says where
     the map is older, which would hold a robot back in a corridor. Returns reward, prior, the weight
-    of matched observations and that of unmatched ones without a vote, and leaves the data's
+    of matched observations and that of unmatched ones without weight, and leaves the data's
     information (without tau and prior) in ``information``, all as before the last step. What is in
     the first 13 rows of ``scratch`` does not matter.
     """
@@ -125,27 +117,15 @@ def refine(  # noqa: C901, PLR0913 (kernel)
     return rewarded, prior, matched, absent
 
 
-class Widths(NamedTuple):
-    """Sums of two variances, m^2.
-
-    place  of the prior's position
-    least  a blur of no more is none
-    most   of the blur: it is shrunk to this
-    """
-
-    place: float
-    least: float
-    most: float
-
-
 @inner
-def blur(
-    seen: Seen, covariance: NDArray[np.float64], widths: Widths, every: int, out: Seen
+def blur(  # noqa: PLR0913 (kernel)
+    seen: Seen, covariance: Float, place: float, least: float, most: float, every: int, out: Seen
 ) -> bool:
     """Fill ``out`` with one of ``every`` so many, smeared by a pose's (3, 3) ``covariance``.
 
     That one is in the robot frame. False, and ``out`` is not to be used, where it smears none of
-    them by more than ``widths.least``.
+    them by more than ``least``; the smear is shrunk to ``most``. Both are sums of two variances,
+    m^2, and so is ``place``, that of the prior's position.
     """
     xx, xy, xt = covariance[0, 0], covariance[0, 1], covariance[0, 2]
     yy, yt, tt = covariance[1, 1], covariance[1, 2], covariance[2, 2]
@@ -153,7 +133,7 @@ def blur(
     for k in range(len(seen.points)):
         x, y = seen.points[k, 0], seen.points[k, 1]
         farthest = max(farthest, x * x + y * y)
-    if 2.0 * (widths.place + farthest * tt) < widths.least:  # (a + b)^2 <= 2 (a^2 + b^2)
+    if 2.0 * (place + farthest * tt) < least:  # (a + b)^2 <= 2 (a^2 + b^2)
         return False
     blurred = False
     for m in range(len(out.points)):
@@ -163,15 +143,15 @@ def blur(
         a = xx - 2.0 * xt * y + tty * y
         b = xy + xt * x - yt * y - ttx * y
         d = yy + 2.0 * yt * x + ttx * x
-        blurred |= a + d > widths.least
-        share = min(1.0, widths.most / max(a + d, 1e-12))
+        blurred |= a + d > least
+        share = min(1.0, most / max(a + d, 1e-12))
         out.points[m, 0], out.points[m, 1] = x, y
         out.covariances[m, 0] = seen.covariances[k, 0] + a * share
         out.covariances[m, 1] = seen.covariances[k, 1] + b * share
         out.covariances[m, 2] = seen.covariances[k, 2] + d * share
-        out.weights[m] = seen.weights[k] * every
+        out.shares[m] = seen.shares[k] * every
         out.tangents[m, 0], out.tangents[m, 1] = seen.tangents[k, 0], seen.tangents[k, 1]
-        out.facings[m], out.votes[m] = seen.facings[k], seen.votes[k]
+        out.facings[m], out.weights[m] = seen.facings[k], seen.weights[k]
     return blurred
 
 
@@ -180,7 +160,7 @@ class Numbers(NamedTuple):
 
     reward, climb  of ``Reward`` and ``Climb``, plain too
     full, exponent, tempered, least_weight  how the weight of the reward falls with the match
-    least, most    of ``Widths``
+    least, most    of ``blur``
     """
 
     reward: tuple[Any, ...]
@@ -193,58 +173,31 @@ class Numbers(NamedTuple):
     most: float
 
 
-@inner
-def _numbers(plain: tuple[Any, ...]) -> tuple[Reward, Climb]:
-    r, c = plain[0], plain[1]
-    return (
-        Reward(r[0], r[1], r[2], r[3], r[4], r[5], r[6], r[7]),
-        Climb(c[0], c[1], c[2], c[3], c[4], c[5], c[6], c[7]),
-    )
-
-
 @uncounted
 def climbed(  # noqa: PLR0913 (kernel)
-    directory: NDArray[np.int32],
-    corner: NDArray[np.int64],
-    x: NDArray[np.float32],
-    y: NDArray[np.float32],
-    facing: NDArray[np.uint8],
-    plain: tuple[Any, ...],
-    points: NDArray[np.float64],
-    covariances: NDArray[np.float64],
-    weights: NDArray[np.float64],
-    tangents: NDArray[np.float64],
-    facings: NDArray[np.uint8],
-    votes: NDArray[np.float64],
-    weight: float,
-    prediction: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    every: int,
-    few: tuple[Any, ...],
-    pose: NDArray[np.float64],
-    information: NDArray[np.float64],
-    scratch: NDArray[np.float64],
-) -> tuple[float, float, float, float]:
-    """Climb from ``pose``, which is changed, with observations of that ``weight`` in all, if any.
+    field: tuple[Any, ...], plain: tuple[Any, ...], seen_arrays: tuple[Any, ...], amount: float,
+    prediction: Float, prior: Float, every: int, few: tuple[Any, ...], pose: Float,
+    information: Float, scratch: Float,
+) -> tuple[float, float, float, float]:  # fmt: skip
+    """Climb from ``pose``, which is changed, with observations of that ``amount`` in all, if any.
 
     ``every`` > 0: from where every so manieth of them leads, blurred by the ``prior``'s covariance;
-    0: the prior is given by its inverse. ``plain``: ``Numbers``. ``few`` (``Seen``) and ``scratch``
-    (``SCRATCH``): room to work in.
+    0: the prior is given by its inverse. ``field`` of ``Field``, ``plain`` of ``Numbers``,
+    ``seen_arrays`` of ``Seen``. ``few`` (``Seen``) and ``scratch`` (``SCRATCH``): room to work in.
     Returns weight of the reward, matched and overlapped share, and score.
     """
-    field, (reward, climb) = Field(directory, corner, x, y, facing), _numbers(plain)
+    of, reward, climb = Field(*field), Reward(*plain[0]), Climb(*plain[1])
     _, _, full, exponent, enough, least_weight, least, most = plain
-    seen = Seen(points, covariances, weights, tangents, facings, votes)
+    seen = Seen(*seen_arrays)
     precision, blurred = scratch[13:16], scratch[16:19]
     if every > 0:
         inverse(prior, precision)
         turn(prior, -prediction[2], blurred)
-        m = -(-len(points) // every)
+        m = -(-len(seen.points) // every)
         those = Seen(few[0][:m], few[1][:m], few[2][:m], few[3][:m], few[4][:m], few[5][:m])
-        widths = Widths(prior[0, 0] + prior[1, 1], least, most)
-        if blur(seen, blurred, widths, every, those):
+        if blur(seen, blurred, prior[0, 0] + prior[1, 1], least, most, every, those):
             refine(
-                field, reward, climb, those, pose, prediction, precision, full, information, scratch
+                of, reward, climb, those, pose, prediction, precision, full, information, scratch
             )
     else:
         for a in range(3):
@@ -252,12 +205,12 @@ def climbed(  # noqa: PLR0913 (kernel)
                 precision[a, b] = prior[a, b]
     information[:] = 0.0
     tau, matched, overlapped, score = full, 0.0, 0.0, -math.inf
-    while weight > 0.0:
+    while amount > 0.0:
         rewarded, of_prior, count, absent = refine(
-            field, reward, climb, seen, pose, prediction, precision, tau, information, scratch
+            of, reward, climb, seen, pose, prediction, precision, tau, information, scratch
         )
-        overlapped = count / weight
-        matched = count / (weight - absent) if count > 0.0 else 0.0
+        overlapped = count / amount
+        matched = count / (amount - absent) if count > 0.0 else 0.0
         score = full * rewarded + of_prior
         tempered = max(full * matched**exponent, least_weight)
         if tau < full or tempered > enough * tau:

@@ -7,8 +7,8 @@ It holds as long as the map is not written to: while the robot is lost.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
+from slam.arrays import Bytes
 from slam.tracker.cell_map import CellMap
 from slam.tracker.cells import SHIFT, SIDE
 from slam.tracker.matching.branch_and_bound import look_ahead
@@ -133,17 +133,17 @@ class CoarseMap:
         return prices.cell_ns * largest.size
 
 
-def pooled(fine: NDArray[np.uint8], pool: int) -> NDArray[np.uint8]:
+def pooled(fine: Bytes, pool: int) -> Bytes:
     """The largest of ``pool`` x ``pool`` neighbouring values."""
     rows, columns = fine.shape
     down = fine.reshape(rows // pool, pool, columns).max(axis=1)
-    largest: NDArray[np.uint8] = down[:, ::pool].copy()
+    largest: Bytes = down[:, ::pool].copy()
     for k in range(1, pool):  # both ways at once take forty times as long
         np.maximum(largest, down[:, k::pool], out=largest)
     return largest
 
 
-def spread(source: NDArray[np.uint8], beside: float) -> NDArray[np.uint8]:
+def spread(source: Bytes, beside: float) -> Bytes:
     """The source, or ``beside`` times the largest of the eight values around."""
     padded = np.pad(source, 1)
     wide = np.maximum(np.maximum(padded[:, :-2], padded[:, 1:-1]), padded[:, 2:])

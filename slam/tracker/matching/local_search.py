@@ -12,15 +12,14 @@ from dataclasses import dataclass
 from typing import Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slam._jit import njit
-from slam.frames import Float
+from slam._jit import njit, uncounted
+from slam.arrays import Bytes, Float, Int32
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import MASK, SHIFT, SIDE, Cells
+from slam.tracker.cells import MASK, SHIFT, SIDE, Cells, activity, slot_of
 from slam.tracker.matching.branch_and_bound import SPAN, Lattice, best_of, look_ahead
-from slam.tracker.matching.config import LocalConfig
+from slam.tracker.matching.config import GlobalConfig, LocalConfig
 
 KEPT = 1 << 23  # bytes of a field that are kept for the next one
 FULL = 255.0  # integer that stands for the field's value 1
@@ -49,44 +48,30 @@ class SearchWindow:
         return cls(reach_m=config.reach_m, turn_rad=config.turn_rad)
 
 
-@njit
-def _field(  # noqa: C901, PLR0912 (kernel)
-    cells: Cells,
-    short_term: float,
-    i0: int,
-    j0: int,
-    kernel: NDArray[np.float64],
-    out: NDArray[np.uint8],
+@uncounted
+def _field(  # noqa: C901, PLR0912, PLR0913 (kernel)
+    cells: Cells, short_term: float, i0: int, j0: int, kernel: Float, out: Bytes, room: Float
 ) -> None:
     """Activities smoothed by the (5,) kernel along both axes, in ``out[j - j0, i - i0]``.
 
     (i0, j0) is the corner of a block, ``out`` a whole number of blocks. Zero where no block lives.
+    ``room`` (2, 12, 12): to work in.
     """
-    rows, columns = cells.directory.shape
-    padded = np.empty((SIDE + 4, SIDE + 4))
-    smooth = np.empty((SIDE + 4, SIDE))
+    padded, smooth = room[0], room[1]
     for block_row in range(out.shape[0] >> SHIFT):
-        row = (j0 >> SHIFT) + block_row - cells.corner[1]
-        if row < 0 or row >= rows:
-            continue
         for block_column in range(out.shape[1] >> SHIFT):
-            column = (i0 >> SHIFT) + block_column - cells.corner[0]
-            if column < 0 or column >= columns or cells.directory[row, column] < 0:
+            left, low = i0 + block_column * SIDE, j0 + block_row * SIDE
+            if slot_of(cells, left, low) < 0:
                 continue
             for a in range(SIDE + 4):
-                r = row + ((a - 2) >> SHIFT)
                 for beside in (-1, 0, 1):  # a block: two of its columns, all, two
                     first, last = max(beside * SIDE + 2, 0), min(beside * SIDE + 2, 4) + SIDE
-                    q, slot = column + beside, np.int32(-1)
-                    if 0 <= r < rows and 0 <= q < columns:
-                        slot = cells.directory[r, q]
+                    slot = slot_of(cells, left + beside * SIDE, low + a - 2)
                     for b in range(first, last):
+                        padded[a, b] = 0.0
                         if slot >= 0:
-                            y = cells.y[slot, (a - 2) & MASK, (b - 2) & MASK]
-                            x = cells.x[slot, (a - 2) & MASK, (b - 2) & MASK]
-                            padded[a, b] = y + (1.0 - y) * short_term * x
-                        else:
-                            padded[a, b] = 0.0
+                            j, i = (a - 2) & MASK, (b - 2) & MASK
+                            padded[a, b] = activity(cells, short_term, slot, j, i)
             for a in range(SIDE + 4):
                 for b in range(SIDE):
                     total = 0.0
@@ -105,13 +90,7 @@ def _field(  # noqa: C901, PLR0912 (kernel)
 
 @njit
 def place(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    prediction: NDArray[np.float64],
-    turns: NDArray[np.float64],
-    cell: float,
-    i0: int,
-    j0: int,
-    out: NDArray[np.int32],
+    points: Float, prediction: Float, turns: Float, cell: float, i0: int, j0: int, out: Int32
 ) -> None:
     """Column and row of each point at each heading, for the predicted position."""
     for h in range(len(turns)):
@@ -130,13 +109,12 @@ def _kernel(sigma: float) -> Float:
     return taps / math.sqrt(math.pi * sigma**2)
 
 
-def field_of(
-    cell_map: CellMap, short_term: float, i0: int, j0: int, field: NDArray[np.uint8]
-) -> NDArray[np.uint8]:
+def field_of(cell_map: CellMap, short_term: float, i0: int, j0: int, field: Bytes) -> Bytes:
     """``field``, which is all 0, filled with smoothed activities from cell (i0, j0) on, which
     begins a block."""
     sigma = cell_map.config.frontend.sigma_cells
-    _field(cell_map.cells, short_term, i0, j0, _kernel(sigma), field)
+    room = np.empty((2, SIDE + 4, SIDE + 4))
+    _field(cell_map.cells, short_term, i0, j0, _kernel(sigma), field, room)
     return field
 
 
@@ -153,9 +131,7 @@ class Around:
         self._low, self._high = np.zeros(2, np.int64), np.zeros(2, np.int64)
         return self
 
-    def fields(
-        self, low: NDArray[np.int32], high: NDArray[np.int32]
-    ) -> tuple[NDArray[np.int32], NDArray[np.uint8]]:
+    def fields(self, low: Int32, high: Int32) -> tuple[Int32, Bytes]:
         """Corner of a field that holds the cells from ``low`` to ``high`` (column, row); the field
         and its maxima ahead (2, rows, columns)."""
         if (low < self._low).any() or (high >= self._high).any():
@@ -174,14 +150,16 @@ class Around:
         return self._low.astype(np.int32), self._fields
 
 
-def headings(points: Float, window: SearchWindow, cell: float, config: LocalConfig) -> Float:
-    """Turns to try, rad: a far point moves little between two of them."""
-    distances = np.sqrt((points * points).sum(axis=1))
-    far = float(np.sort(distances)[(3 * len(distances)) // 4])
-    step = config.heading_cells * cell / max(far, cell)
-    step = min(max(step, config.finest_rad), config.coarsest_rad)
-    half = math.ceil(window.turn_rad / step)
-    return np.asarray(np.arange(-half, half + 1) * step, dtype=np.float64)
+def heading_step(
+    points: Float, step_m: float, least_m: float, config: LocalConfig | GlobalConfig
+) -> float:
+    """Rad between two headings, with which a far point moves by ``step_m``.
+
+    Far: farther than three quarters of them, and ``least_m``.
+    """
+    distances = np.sort(np.sqrt((points * points).sum(axis=1)))
+    far = float(distances[(3 * len(distances)) // 4])
+    return min(max(step_m / max(far, least_m), config.finest_rad), config.coarsest_rad)
 
 
 def search(  # noqa: PLR0913 (arrays of one problem)
@@ -203,7 +181,9 @@ def search(  # noqa: PLR0913 (arrays of one problem)
         return prediction, 0
     every = math.ceil(len(points) / config.points)
     chosen = np.ascontiguousarray(points[::every])
-    turns = headings(chosen, window, cell, config)
+    step = heading_step(chosen, config.heading_cells * cell, cell, config)
+    half = math.ceil(window.turn_rad / step)
+    turns = np.arange(-half, half + 1, dtype=np.float64) * step
     reach = math.ceil(window.reach_m / cell)
     bases = np.empty((len(turns), len(chosen), 2), np.int32)
     place(chosen, prediction, turns, cell, 0, 0, bases)
@@ -213,7 +193,7 @@ def search(  # noqa: PLR0913 (arrays of one problem)
     high = np.array([columns.max(), rows.max()]) + edge
     corner, (field, ahead) = around.fields(low, high)
     bases -= corner
-    scale = gain * float(observations.weights.mean()) * len(points) / len(chosen) / FULL
+    scale = gain * float(observations.shares.mean()) * len(points) / len(chosen) / FULL
     lattice = Lattice(
         field=field,
         ahead=ahead,

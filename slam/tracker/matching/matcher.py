@@ -13,7 +13,7 @@ from statistics import median
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend import odometry_prior
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, inverted
@@ -29,18 +29,18 @@ LEAST = 1e-9  # shares are divided by the usual one
 
 
 def seen_by(observations: Observations) -> Seen:
-    """The arrays of ``observations``; all votes are 1 where nothing is known of them.
+    """The arrays of ``observations``; all weights are 1 where nothing is known of them.
 
     Every second point of a scan is copied: kernels are compiled once, for points without gaps.
     """
     return Seen(
         np.ascontiguousarray(observations.points_robot),
         observations.covariances,
-        observations.weights,
+        observations.shares,
         observations.tangents,
         observations.facings,
-        np.ones(len(observations.points_robot)) if observations.votes is None
-        else observations.votes,
+        np.ones(len(observations.points_robot)) if observations.weights is None
+        else observations.weights,
     )  # fmt: skip
 
 
@@ -51,7 +51,7 @@ class Match:
     T_map_robot  (3,) best pose
     information  (3, 3) of the data alone, by (x, y, theta) in the map frame
     matched      share of the observations that overlap the map, 0 without observations; what does
-                 not, and has no vote (``tracker.standing``), is left out of it
+                 not, and has no weight (``tracker.standing``), is left out of it
     overlapped   the same share of all observations
     score        reward at full weight - 1/2 Mahalanobis^2: comparable between matches of a frame
     tau          weight the reward had in the end
@@ -219,54 +219,31 @@ class Matcher:
     def matched(
         self, cell_map: CellMap, observations: Observations, prediction: Float, covariance: Float
     ) -> Match:
-        """The climb from where ``approach`` leads, with the prior that this has."""
-        every = math.ceil(len(observations.points_robot) / self.numbers.climb.few)
-        weight = observations.weight
-        return self._climbed(
-            cell_map, observations, weight, prediction, prediction, covariance, every
-        )
+        """The optimum with that prior, reached from where observations that are blurred by it lead.
 
-    def climb(
-        self,
-        cell_map: CellMap,
-        observations: Observations,
-        start: Float,
-        prediction: Float,
-        precision: Float,
-    ) -> Match:
-        """The local optimum reached from ``start``; the reward's weight falls with the match."""
-        weight = observations.weight
-        return self._climbed(cell_map, observations, weight, start, prediction, precision, 0)
-
-    def approach(
-        self, cell_map: CellMap, observations: Observations, prediction: Float, covariance: Float
-    ) -> Float:
-        """Where to start climbing: the optimum for observations blurred by the prior's own spread.
-
-        Returns the prediction itself where the prior moves no observation by half a cell.
+        They lead from the prediction itself where the prior moves none by half a cell.
         """
         every = math.ceil(len(observations.points_robot) / self.numbers.climb.few)
-        return self._climbed(
-            cell_map, observations, 0.0, prediction, prediction, covariance, every
-        ).T_map_robot
+        return self._climbed(cell_map, observations, prediction, prediction, covariance, every)
 
-    def _climbed(  # noqa: PLR0913 (arrays of one problem)
-        self,
-        cell_map: CellMap,
-        observations: Observations,
-        weight: float,
-        start: Float,
-        prediction: Float,
-        prior: Float,
-        every: int,
-    ) -> Match:
+    def climb(
+        self, cell_map: CellMap, observations: Observations, start: Float, prediction: Float,
+        precision: Float,
+    ) -> Match:  # fmt: skip
+        """The local optimum reached from ``start``; the reward's weight falls with the match."""
+        return self._climbed(cell_map, observations, start, prediction, precision, 0)
+
+    def _climbed(
+        self, cell_map: CellMap, observations: Observations, start: Float, prediction: Float,
+        prior: Float, every: int,
+    ) -> Match:  # fmt: skip
         """As the kernel ``climbed``."""
-        cells, of = cell_map.cells, seen_by(observations)
+        cells, seen = cell_map.cells, tuple(seen_by(observations))
+        field = cells.directory, cells.corner, cells.x, cells.y, cells.facing
         pose, information = np.array(start, dtype=np.float64), np.empty((3, 3))
         tau, matched, overlapped, score = climbed(
-            cells.directory, cells.corner, cells.x, cells.y, cells.facing, self._plain,
-            of.points, of.covariances, of.weights, of.tangents, of.facings, of.votes, weight,
-            prediction, prior, every, self._few, pose, information, self._scratch,
+            field, self._plain, seen, observations.amount, prediction, prior, every, self._few,
+            pose, information, self._scratch,
         )  # fmt: skip
         pose[2] = se2.wrap(float(pose[2]))
         return Match(

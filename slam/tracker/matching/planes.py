@@ -11,10 +11,9 @@ import math
 from typing import NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
-from slam.frames import Float
+from slam.arrays import Bytes, Float, Int32, Ints, Words
 from slam.tracker.matching.branch_and_bound import SPAN as SPAN
 from slam.tracker.matching.branch_and_bound import open_block
 
@@ -37,12 +36,12 @@ class Queue(NamedTuple):
     (heading rows + row) columns + column, of offsets counted from the lowest.
     """
 
-    blocks: NDArray[np.int64]
-    keys: NDArray[np.int64]
-    heap: NDArray[np.int64]
+    blocks: Ints
+    keys: Ints
+    heap: Ints
     taken: Float
-    scores: NDArray[np.int64]
-    counts: NDArray[np.int64]
+    scores: Ints
+    counts: Ints
 
 
 LARGE = 1 << 40  # above every sum
@@ -51,8 +50,8 @@ MORE, DONE, NEXT = 0, 1, 2
 
 @njit
 def flatten(
-    bases: NDArray[np.int32], low: tuple[int, int], shape: tuple[int, int], width: int,
-    out: NDArray[np.uint64],
+    bases: Int32, low: tuple[int, int], shape: tuple[int, int], width: int,
+    out: Words
 ) -> None:  # fmt: skip
     """Places (headings, n) in a plane of ``width``, flat, of the points at the lowest offset.
 
@@ -67,9 +66,7 @@ def flatten(
 
 
 @njit
-def bound_blocks(
-    plane: NDArray[np.uint8], flat: NDArray[np.uint64], columns: int, out: NDArray[np.int32]
-) -> None:
+def bound_blocks(plane: Bytes, flat: Words, columns: int, out: Int32) -> None:
     """Bounds (headings, rows, columns) of the coarsest blocks; ``plane`` is theirs, flat.
 
     ``flat`` as ``flatten`` gives it; a phase of the plane has so many ``columns``.
@@ -87,7 +84,7 @@ def bound_blocks(
 
 
 @inner
-def _push(heap: NDArray[np.int64], size: int, key: int, node: int) -> None:
+def _push(heap: Ints, size: int, key: int, node: int) -> None:
     """Into a heap of ``size``, which has room."""
     at = size
     while at > 0:
@@ -100,7 +97,7 @@ def _push(heap: NDArray[np.int64], size: int, key: int, node: int) -> None:
 
 
 @inner
-def _drop(heap: NDArray[np.int64], size: int) -> None:
+def _drop(heap: Ints, size: int) -> None:
     """The first of a heap of ``size``."""
     last = size - 1
     key, node = heap[last, 0], heap[last, 1]
@@ -123,9 +120,7 @@ def _drop(heap: NDArray[np.int64], size: int) -> None:
 
 
 @inner
-def is_apart(
-    taken: NDArray[np.float64], apart: tuple[float, float], column: int, row: int, turn: float
-) -> bool:
+def is_apart(taken: Float, apart: tuple[float, float], column: int, row: int, turn: float) -> bool:
     """Whether a candidate differs from all that were taken, (n, 3) by column, row and turn."""
     for k in range(len(taken)):
         off = turn - taken[k, 2]
@@ -138,8 +133,8 @@ def is_apart(
 
 @njit
 def open_nodes(  # noqa: C901, PLR0912, PLR0913, PLR0915 (kernel)
-    planes: tuple[NDArray[np.uint8], NDArray[np.uint8]],
-    flats: tuple[NDArray[np.uint64], NDArray[np.uint64]],
+    planes: tuple[Bytes, Bytes],
+    flats: tuple[Words, Words],
     widths: tuple[int, int],
     turns: Float,
     low: tuple[int, int],

@@ -9,12 +9,11 @@ poses then creeps. Gradient and curvature of that sum are analytic.
 import math
 from typing import NamedTuple
 
-import numpy as np
-from numpy.typing import NDArray
-
 from slam._jit import inlined, inner, uncounted
+from slam.arrays import Bytes, Float
+from slam.frontend.odometry_prior import rotate
 from slam.frontend.surfaces import opposite, turned_face
-from slam.tracker.cells import MASK, SHIFT, Cells
+from slam.tracker.cells import MASK, SHIFT, Cells, Field, activity
 
 
 class Reward(NamedTuple):
@@ -38,22 +37,12 @@ class Reward(NamedTuple):
 class Seen(NamedTuple):
     """Observations as the kernels see them; fields as in ``Observations``."""
 
-    points: NDArray[np.float64]
-    covariances: NDArray[np.float64]
-    weights: NDArray[np.float64]
-    tangents: NDArray[np.float64]
-    facings: NDArray[np.uint8]
-    votes: NDArray[np.float64]
-
-
-class Field(NamedTuple):
-    """The arrays of ``Cells`` that overlaps need: all twelve would be copied at every call."""
-
-    directory: NDArray[np.int32]
-    corner: NDArray[np.int64]
-    x: NDArray[np.float32]
-    y: NDArray[np.float32]
-    facing: NDArray[np.uint8]
+    points: Float
+    covariances: Float
+    shares: Float
+    tangents: Float
+    facings: Bytes
+    weights: Float
 
 
 class Bell(NamedTuple):
@@ -148,8 +137,8 @@ def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
                     offset += 1.0
                     i += 1
                 while i < end:
-                    x, y = field.x[slot, j & MASK, i & MASK], field.y[slot, j & MASK, i & MASK]
-                    value = y + (1.0 - y) * short_term * x
+                    y = field.y[slot, j & MASK, i & MASK]
+                    value = activity(field, short_term, slot, j & MASK, i & MASK)
                     value -= closed * y * (1.0 - y)
                     if opposite(faced, field.facing[slot, j & MASK, i & MASK]):
                         value = 0.0
@@ -184,19 +173,6 @@ def _overlap(  # noqa: C901, PLR0913, PLR0915 (kernel)
 
 
 @inner
-def _turned(
-    covariances: NDArray[np.float64], k: int, c: float, s: float, scale: float
-) -> tuple[float, float, float]:
-    """Covariance ``k`` (xx, xy, yy) turned by the angle of cosine c and sine s, in cells."""
-    xx, xy, yy = covariances[k, 0], covariances[k, 1], covariances[k, 2]
-    return (
-        (c * c * xx - 2.0 * c * s * xy + s * s * yy) * scale * scale,
-        (c * s * (xx - yy) + (c * c - s * s) * xy) * scale * scale,
-        (s * s * xx + 2.0 * c * s * xy + c * c * yy) * scale * scale,
-    )
-
-
-@inner
 def _positive_part(a: float, b: float, d: float) -> tuple[float, float, float]:
     """[[a, b], [b, d]] without its eigenvectors of a negative eigenvalue."""
     mean, half = 0.5 * (a + d), 0.5 * (a - d)
@@ -215,10 +191,10 @@ def evaluate(  # noqa: PLR0913 (kernel)
     cells: Cells,
     reward: Reward,
     seen: Seen,
-    pose: NDArray[np.float64],
-    gradient: NDArray[np.float64],
-    along: NDArray[np.float64],
-    information: NDArray[np.float64],
+    pose: Float,
+    gradient: Float,
+    along: Float,
+    information: Float,
 ) -> tuple[float, float, float]:
     """``evaluated`` on a map."""
     field = Field(cells.directory, cells.corner, cells.x, cells.y, cells.facing)
@@ -230,13 +206,13 @@ def evaluated(  # noqa: PLR0913, PLR0915 (kernel)
     field: Field,
     reward: Reward,
     seen: Seen,
-    pose: NDArray[np.float64],
-    gradient: NDArray[np.float64],
-    along: NDArray[np.float64],
-    information: NDArray[np.float64],
+    pose: Float,
+    gradient: Float,
+    along: Float,
+    information: Float,
 ) -> tuple[float, float, float]:
     """Sum of rewards of the observations seen from ``pose``, the weight of those matched, and that
-    of those unmatched without a vote.
+    of those unmatched without weight.
 
     Fills the gradient (3,) by (x, y, theta), the part of it ``along`` the observed surfaces, and
     the information (3, 3): the negative curvature, of each observation only where it is positive,
@@ -253,29 +229,31 @@ def evaluated(  # noqa: PLR0913, PLR0915 (kernel)
     for k in range(len(seen.points)):
         rx = c * seen.points[k, 0] - s * seen.points[k, 1]
         ry = s * seen.points[k, 0] + c * seen.points[k, 1]
-        a, b, d = _turned(seen.covariances, k, c, s, scale)
+        xx, xy, yy = seen.covariances[k, 0], seen.covariances[k, 1], seen.covariances[k, 2]
+        a, b, d = rotate(c, s, xx, xy, yy)
+        a, b, d = a * scale * scale, b * scale * scale, d * scale * scale
         if a != alike[0] or b != alike[1] or d != alike[2]:
             alike, bell = (a, b, d), _bell(a, b, d, reward.tail, reward.tail_cells)
         u, v = (rx + pose[0]) * scale - 0.5, (ry + pose[1]) * scale - 0.5
-        vote = seen.votes[k]
-        closed = reward.young_trace * (1.0 - vote)
+        weight = seen.weights[k]
+        closed = reward.young_trace * (1.0 - weight)
         faced = turned_face(seen.facings[k], pose[2])
-        f, gx, gy, a, b, d = _overlap(field, reward.short_term * vote, closed, u, v, bell, faced)
+        f, gx, gy, a, b, d = _overlap(field, reward.short_term * weight, closed, u, v, bell, faced)
         if f > reward.matched_overlap:
-            matched += seen.weights[k]
+            matched += seen.shares[k]
         else:
-            absent += seen.weights[k] * (1.0 - vote)
+            absent += seen.shares[k] * (1.0 - weight)
         gx, gy = gx * scale, gy * scale
         a, b, d = a * scale * scale, b * scale * scale, d * scale * scale
         if reward.logarithm:
             inverse = 1.0 / (reward.log_floor + f)
-            score += seen.weights[k] * math.log(reward.log_floor + f)
+            score += seen.shares[k] * math.log(reward.log_floor + f)
             gx, gy = gx * inverse, gy * inverse
             a, b, d = a * inverse + gx * gx, b * inverse + gx * gy, d * inverse + gy * gy
         else:
-            score += seen.weights[k] * f
+            score += seen.shares[k] * f
         a, b, d = _positive_part(a, b, d)
-        w = seen.weights[k]
+        w = seen.shares[k]
         gx, gy, a, b, d = w * gx, w * gy, w * a, w * b, w * d
         gradient[0] += gx
         gradient[1] += gy

@@ -8,14 +8,13 @@ import math
 from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slam.frames import Float
+from slam.arrays import Float, Ints, Words
 from slam.tracker.matching import planes
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.coarse_map import CoarseMap
 from slam.tracker.matching.config import GlobalConfig
-from slam.tracker.matching.local_search import place
+from slam.tracker.matching.local_search import heading_step, place
 from slam.tracker.matching.planes import LARGE, SPAN, Queue, bound_blocks, flatten, open_nodes
 
 FIRST_ROOM = 1 << 22  # nodes of the heap: 64 MiB, no memory until used; growing copies all of it
@@ -54,7 +53,7 @@ class WholeSearch:
         self._queue: Queue | None = None
         self._state, self._least = planes.MORE, 0  # of the queue; blocks with more are in it
         self._counts, self._bin = np.zeros(BINS, np.int64), BINS  # blocks by bound; those queued
-        self._flats: list[NDArray[np.uint64]] = []  # of each plane
+        self._flats: list[Words] = []  # of each plane
 
     def __getstate__(self) -> dict[str, Any]:
         """A copy without room that is not used."""
@@ -80,14 +79,16 @@ class WholeSearch:
     def _begin(self, budget: Budget) -> None:
         """Lay out the candidates."""
         coarse = self._coarse
-        self._turns = headings(self._points, coarse.pitch, self._config)
+        step = heading_step(self._points, coarse.pitch, coarse.pitch, self._config)
+        count = math.ceil(math.tau / step)
+        self._turns = np.arange(count, dtype=np.float64) * (math.tau / count)  # all round
         self._reach = tuple(math.ceil(0.5 * n) for n in coarse.shape)  # rows, columns
         i0, j0 = (c + coarse.margin for c in coarse.corner)
         rows, columns = coarse.shape
         self._middle = np.array([i0 + 0.5 * columns, j0 + 0.5 * rows, 0.0]) * coarse.pitch
         if self._about is not None:
             self._middle, reach_m, turn_rad = self._about
-            step = float(self._turns[1])
+            step = math.tau / count
             half, reach = math.ceil(turn_rad / step), math.ceil(reach_m / coarse.pitch)
             self._turns = step * np.arange(-half, half + 1, dtype=np.float64)
             self._reach = reach, reach
@@ -136,7 +137,7 @@ class WholeSearch:
         self._queue = queue._replace(blocks=nodes, keys=keys)
         budget.spend(budget.prices.order_ns * (bounds.size + SORTED * len(nodes)))
 
-    def _nodes(self, flat: NDArray[np.int64]) -> tuple[NDArray[np.int64], NDArray[np.int64]]:
+    def _nodes(self, flat: Ints) -> tuple[Ints, Ints]:
         """Nodes and keys of these of the coarsest blocks, by falling bound."""
         width = self._coarse.planes[self._coarse.widest].shape[0]
         (rows, columns), (_, down, along) = self._sizes(), self._bounds.shape
@@ -191,12 +192,3 @@ class WholeSearch:
         first, self._given = self._given, int(self._queue.counts[planes.TAKEN])
         scale = np.array([self._coarse.pitch, self._coarse.pitch, 1.0])
         return [self._middle + offset * scale for offset in self._queue.taken[first : self._given]]
-
-
-def headings(points: Float, pitch: float, config: GlobalConfig) -> Float:
-    """Turns to try, rad: all round, so that a far point moves by about one pitch between two."""
-    distances = np.sort(np.sqrt((points * points).sum(axis=1)))
-    far = float(distances[(3 * len(distances)) // 4])
-    step = min(max(pitch / max(far, pitch), config.finest_rad), config.coarsest_rad)
-    count = math.ceil(math.tau / step)
-    return np.asarray(np.arange(count) * (math.tau / count), dtype=np.float64)

@@ -12,7 +12,7 @@ import math
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.odometry_prior import Prediction, inverted, squared, turned
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.uncertainty.covariances import carried
@@ -80,21 +80,21 @@ class Agreement:
             known = across
         return covariance - inverted(inverted(covariance) + known)
 
-    def _left_to_movers(self, off: Float, vote: float) -> Float:
-        """(3,) of a correction by returns of that mean vote."""
+    def _left_to_movers(self, off: Float, weight: float) -> Float:
+        """(3,) of a correction by returns of that mean weight."""
         share = np.array([1.0, 1.0, LEVER_M**2])
         x, y, turn = off.tolist()
         inverse = inverted(np.diag(share) + self._held / max(self._looks, 1.0))
         pulled = inverse[:, 0] * x + inverse[:, 1] * y + inverse[:, 2] * turn
-        return np.asarray(min(max(1.0 - vote, 0.0) / FEW, 1.0) * share * pulled)
+        return np.asarray(min(max(1.0 - weight, 0.0) / FEW, 1.0) * share * pulled)
 
-    def take(self, prediction: Prediction, T_map_robot: Float, vote: float) -> None:
-        """The robot is matched to ``T_map_robot`` by returns of that mean vote."""
+    def take(self, prediction: Prediction, T_map_robot: Float, weight: float) -> None:
+        """The robot is matched to ``T_map_robot`` by returns of that mean weight."""
         keep = math.exp(-prediction.elapsed / self._config.window_s)
         x, y, turn = prediction.increment.tolist()
         off, self._elapsed_s = prediction.off(T_map_robot), prediction.elapsed
         self._sum = keep * self._sum + off
-        self._by_movers = keep * self._by_movers + self._left_to_movers(off, vote)
+        self._by_movers = keep * self._by_movers + self._left_to_movers(off, weight)
         self._variance = keep * keep * self._variance + prediction.covariance
         self._way_m = keep * self._way_m + math.hypot(x, y)
         self._turn_rad = keep * self._turn_rad + abs(turn)
@@ -128,7 +128,7 @@ class Agreement:
         return np.multiply.outer(self._by_movers, self._by_movers)
 
     def left_behind(self) -> Float:
-        """(3, 3) the part of that which the window is about to forget: the map's from now on.
+        """(3, 3) the part of that which the window is about to forget, and which the map keeps.
 
         It is handed over once, until the next match.
         """

@@ -63,4 +63,4 @@ class StandingConfig(Settings):
     match_deg: float = number(0.2, "deg", "the same of its heading", SEEDS, low=1e-6)
 
 
-ALL_VOTE = StandingConfig(settled_s=0.0, disagreed=0.0)  # every return
+FULL_WEIGHT = StandingConfig(settled_s=0.0, disagreed=0.0)  # every return

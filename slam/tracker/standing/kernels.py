@@ -2,12 +2,10 @@
 """What earlier scans say about the places of present returns, and the other way round."""
 
 import math
-from typing import NamedTuple
-
-import numpy as np
-from numpy.typing import NDArray
+from typing import Any, NamedTuple
 
 from slam._jit import inlined, inner, uncounted
+from slam.arrays import Bools, Float, Ints
 from slam.frontend.polar import BEARING_OFF, bearing, bin_of
 from slam.frontend.surfaces import apart
 
@@ -25,9 +23,38 @@ class Asking(NamedTuple):
     spread: float
     sure: float
     settled_s: float
+    came_s: float
+    left_s: float
     left_m: float
     along_m: float
     thin_m: float
+
+
+class Present(NamedTuple):
+    """The scan of now: ``points`` (n, 2) in the robot frame, ``joined`` (n,), ``limit`` (bins,) as
+    in ``View``; where robot and laser are.
+    """
+
+    points: Float
+    joined: Bools
+    limit: Float
+    T_map_robot: Float
+    T_map_laser: Float
+    T_robot_laser: Float
+
+
+class Asked(NamedTuple):
+    """The scans that are asked, newest first.
+
+    lasers  (J, 3) in the map; ``limits`` (J, bins) free ranges as in ``View``; ``ages`` (J,) s
+    points  of all scans, in the map, up to ``ends`` (J,) of each
+    """
+
+    lasers: Float
+    limits: Float
+    ages: Float
+    points: Float
+    ends: Ints
 
 
 @inner
@@ -48,9 +75,7 @@ def _bin(turns: float, of: Asking, x: float, y: float, shift: float) -> int:
 
 
 @inlined
-def _passed(
-    limit: NDArray[np.float64], of: Asking, x: float, y: float, r: float, turns: float
-) -> bool:
+def _passed(limit: Float, of: Asking, x: float, y: float, r: float, turns: float) -> bool:
     """Whether all beams within the spread went on beyond (x, y) (laser axes) by the margin.
 
     ``r`` m away, and so many bins round by ``bearing``.
@@ -70,7 +95,7 @@ def _passed(
 
 
 @inlined
-def _in_view(limit: NDArray[np.float64], of: Asking, r: float, turns: float) -> bool:
+def _in_view(limit: Float, of: Asking, r: float, turns: float) -> bool:
     """Whether nothing hid a place ``r`` m away, and a beam came that way.
 
     The widest of three bins: at a wall that is seen at a grazing angle each falls short of it.
@@ -86,8 +111,8 @@ def _in_view(limit: NDArray[np.float64], of: Asking, r: float, turns: float) -> 
 
 @inner
 def _polar(
-    points: NDArray[np.float64], seen_from: tuple[float, float, float, float],
-    laser: NDArray[np.float64], step: float, polar: NDArray[np.float64],
+    points: Float, seen_from: tuple[float, float, float, float],
+    laser: Float, step: float, polar: Float,
 ) -> None:  # fmt: skip
     """Where points are about a laser: ``polar`` (4, at least n) x, y, distance, and how many bins
     round by ``bearing``. In a loop of its own, which takes several at once.
@@ -107,144 +132,105 @@ def _polar(
 
 
 @inner
-def _emptied(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    pose: NDArray[np.float64],
-    lasers: NDArray[np.float64],
-    limits: NDArray[np.float64],
-    ages: NDArray[np.float64],
-    of: Asking,
-    recent: int,
-    polar: NDArray[np.float64],
-    seen: NDArray[np.float64],
-    out: NDArray[np.float64],
-) -> int:
-    """Age of the newest scan that saw the place of each point (robot frame) empty, else inf.
+def _emptied(now: Present, asked: Asked, of: Asking, polar: Float, seen: Float, out: Float) -> int:
+    """Age of the newest scan that saw the place of each point empty, else inf.
 
-    Returns the number of points whose places any of them had in view.
-
-    lasers  (J, 3) in the map, ``limits`` (J, bins) free ranges as in ``View``, newest first, of
-    which the first few, ``recent``, are asked; ``polar``, ``seen``: room to work in
+    Returns the number of points whose places any of them had in view. ``polar``, ``seen``: room to
+    work in.
     """
-    n, in_view = len(points), 0
+    n, in_view, pose = len(now.points), 0, now.T_map_robot
     seen_from = (pose[0], pose[1], math.cos(pose[2]), math.sin(pose[2]))
     for k in range(n):
         out[k], seen[k] = math.inf, 0.0
-    for j in range(recent):
-        _polar(points, seen_from, lasers[j], of.step, polar)
+    for j in range(len(asked.ages)):
+        if asked.ages[j] > of.came_s:
+            break  # ages rise
+        _polar(now.points, seen_from, asked.lasers[j], of.step, polar)
         for k in range(n):
             if out[k] < math.inf:
                 continue
             r, turns = polar[2, k], polar[3, k]
-            if seen[k] == 0.0 and _in_view(limits[j], of, r, turns):
+            if seen[k] == 0.0 and _in_view(asked.limits[j], of, r, turns):
                 seen[k] = 1.0
                 in_view += 1
-            if _passed(limits[j], of, polar[0, k], polar[1, k], r, turns):
-                out[k] = ages[j]
+            if _passed(asked.limits[j], of, polar[0, k], polar[1, k], r, turns):
+                out[k] = asked.ages[j]
     return in_view
 
 
 @inner
-def _indexed(
-    points: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    step: float,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-) -> None:
-    """First and last point (robot frame, in order of bearing) of each bin about the laser; -1."""
-    c, s = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
-    bins = len(first)
-    for b in range(bins):
-        first[b] = last[b] = -1
-    for k in range(len(points)):
-        dx, dy = points[k, 0] - T_robot_laser[0], points[k, 1] - T_robot_laser[1]
-        b = bin_of(c * dx + s * dy, c * dy - s * dx, step, 0.5) % bins
-        if first[b] < 0:
-            first[b] = k
-        last[b] = k
+def _indexed(now: Present, step: float, bins: Ints) -> None:
+    """First and last point (in order of bearing) of each of ``bins`` about the laser; -1."""
+    c, s = math.cos(now.T_robot_laser[2]), math.sin(now.T_robot_laser[2])
+    n = bins.shape[1]
+    for b in range(n):
+        bins[0, b] = bins[1, b] = -1
+    for k in range(len(now.points)):
+        dx, dy = now.points[k, 0] - now.T_robot_laser[0], now.points[k, 1] - now.T_robot_laser[1]
+        b = bin_of(c * dx + s * dy, c * dy - s * dx, step, 0.5) % n
+        if bins[0, b] < 0:
+            bins[0, b] = k
+        bins[1, b] = k
 
 
 @inner
 def _left(  # noqa: PLR0913 (kernel)
-    before: NDArray[np.float64],
-    age: float,
-    points: NDArray[np.float64],
-    T_map_laser: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    limit: NDArray[np.float64],
-    of: Asking,
-    first: NDArray[np.int64],
-    last: NDArray[np.int64],
-    polar: NDArray[np.float64],
-    out: NDArray[np.float64],
+    before: Float, age: float, now: Present, of: Asking, bins: Ints, polar: Float, out: Float
 ) -> None:
     """Lower ``out`` to ``age`` for points within ``left_m`` of a place that was left.
 
     before  (m, 2) points of an earlier scan, map frame; left if present beams pass them
-    points  (n, 2) present ones, robot frame, by bin ``first`` to ``last`` (see ``indexed``)
-    limit   (bins,) free ranges of the present scan
+    bins    (2, bins) first and last point of each, see ``_indexed``
     """
-    near = of.left_m
-    bins = len(limit)
-    lc, ls = math.cos(T_robot_laser[2]), math.sin(T_robot_laser[2])
-    _polar(before, (0.0, 0.0, 1.0, 0.0), T_map_laser, of.step, polar)
+    near, points, laser = of.left_m, now.points, now.T_robot_laser
+    lc, ls = math.cos(laser[2]), math.sin(laser[2])
+    _polar(before, (0.0, 0.0, 1.0, 0.0), now.T_map_laser, of.step, polar)
     for i in range(len(before)):
         u, v, r, around = polar[0, i], polar[1, i], polar[2, i], polar[3, i]
-        if not _passed(limit, of, u, v, r, around):
+        if not _passed(now.limit, of, u, v, r, around):
             continue
-        x, y = lc * u - ls * v + T_robot_laser[0], ls * u + lc * v + T_robot_laser[1]
+        x, y = lc * u - ls * v + laser[0], ls * u + lc * v + laser[1]
         middle = _bin(around, of, u, v, 0.5)
         # 1.6 > pi / 2: asin(q) is below 1.6 q for q in [0, 1]
         wide = math.floor(min(near / max(r, near), 1.0) * 1.6 / of.step) + 1
         for b in range(middle - wide, middle + wide + 1):
-            at = _wrapped(b, bins)
-            if first[at] < 0:
+            at = _wrapped(b, bins.shape[1])
+            if bins[0, at] < 0:
                 continue
-            for k in range(first[at], last[at] + 1):
+            for k in range(bins[0, at], bins[1, at] + 1):
                 ex, ey = points[k, 0] - x, points[k, 1] - y
                 if ex * ex + ey * ey < near * near:
                     out[k] = min(out[k], age)
 
 
 @inner
-def _along(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    votes: NDArray[np.float64],
-    reach: float,
-    thin: float,
-    before: NDArray[np.float64],
-    out: NDArray[np.float64],
-) -> None:
-    """Mean of ``votes`` along the surface of each point, up to ``reach`` m each way.
+def _along(now: Present, of: Asking, weights: Float, before: Float, out: Float) -> None:
+    """Mean of ``weights`` along the surface of each point, up to ``along_m`` each way.
 
-    1 where that stretch is shorter than ``thin`` m: earlier beams may have gone by such a thing.
-    ``before`` (n + 1,): room for the sums of the votes before each point.
+    1 where that stretch is shorter than ``thin_m``: earlier beams may have gone by such a thing.
+    ``before`` (n + 1,): room for the sums of the weights before each point.
     """
-    n = len(points)
+    points, joined, n = now.points, now.joined, len(now.points)
     before[0] = 0.0
     for k in range(n):
-        before[k + 1] = before[k] + votes[k]
+        before[k + 1] = before[k] + weights[k]
     first, last = 0, 0
     for k in range(n):
         if k > 0 and not joined[k - 1]:
             first = k
-        while apart(points, first, k) >= reach:
+        while apart(points, first, k) >= of.along_m:
             first += 1
         last = max(last, k)
-        while last + 1 < n and joined[last] and apart(points, k, last + 1) < reach:
+        while last + 1 < n and joined[last] and apart(points, k, last + 1) < of.along_m:
             last += 1
-        if apart(points, first, last) >= thin:
+        if apart(points, first, last) >= of.thin_m:
             out[k] = min((before[last + 1] - before[first]) / (last + 1 - first), 1.0)
         else:
             out[k] = 1.0
 
 
 @uncounted
-def placed(
-    points: NDArray[np.float64], pose: NDArray[np.float64], out: NDArray[np.float64]
-) -> None:
+def placed(points: Float, pose: Float, out: Float) -> None:
     """``out`` (n, 2): points of the robot frame in the map."""
     c, s = math.cos(pose[2]), math.sin(pose[2])
     for k in range(len(points)):
@@ -253,54 +239,28 @@ def placed(
 
 
 @uncounted
-def votes(  # noqa: PLR0913 (kernel)
-    points: NDArray[np.float64],
-    joined: NDArray[np.bool_],
-    limit: NDArray[np.float64],
-    pose: NDArray[np.float64],
-    T_map_laser: NDArray[np.float64],
-    T_robot_laser: NDArray[np.float64],
-    lasers: NDArray[np.float64],
-    limits: NDArray[np.float64],
-    ages: NDArray[np.float64],
-    before: NDArray[np.float64],
-    counts: NDArray[np.int64],
-    asked: tuple[int, float, float],
-    plain: tuple[float, float, float, float, float, float, float, float],
-    scratch: NDArray[np.float64],
-    bins: NDArray[np.int64],
-    out: NDArray[np.float64],
-) -> float:
-    """Fill ``out`` (n,) with the vote of each of the points (robot frame), see ``Standing``.
+def weigh(
+    present: tuple[Any, ...], earlier: tuple[Any, ...], plain: tuple[Any, ...], scratch: Float,
+    bins: Ints, out: Float,
+) -> float:  # fmt: skip
+    """Fill ``out`` (n,) with the weight of each point of ``Present``, see ``Standing``.
 
-    Returns the share of the points whose places any of the scans asked had in view.
-
-    limit   (bins,) free ranges of the present scan, seen from ``T_map_laser``
-    lasers, limits, ages  of the scans asked, newest first, see ``_emptied``
-    before  (J, w, 2) points in the map of each scan, of which it has ``counts`` (J,)
-    asked   how many scans; s up to which they may have seen a place empty, and things left one
-    plain   numbers of ``Asking``
-    scratch (6, at least n + 1, and points of any scan before), bins (2, bins): room to work in
+    Returns the share of the points whose places any of the scans asked had in view. ``earlier``
+    of ``Asked``, ``plain`` of ``Asking``; ``scratch`` (6, at least n + 1, and points of any scan
+    before) and ``bins`` (2, bins): room to work in.
     """
-    n = len(points)
-    of = Asking(
-        plain[0], plain[1], plain[2], plain[3], plain[4], plain[5], plain[6], plain[7]
-    )  # as a named tuple it would take longer to get here
-    stood, own, polar, first, last = scratch[0], scratch[1], scratch[2:], bins[0], bins[1]
-    recent, lately = 0, 0  # the first ones: ages rise
-    while recent < asked[0] and ages[recent] <= asked[1]:
-        recent += 1
-    while lately < asked[0] and ages[lately] <= asked[2]:
-        lately += 1
-    in_view = _emptied(points, pose, lasers, limits, ages, of, recent, polar, own, stood)
-    _indexed(points, T_robot_laser, of.step, first, last)
-    for j in range(lately):
-        _left(
-            before[j, : counts[j]], ages[j], points, T_map_laser, T_robot_laser, limit, of,
-            first, last, polar, stood,
-        )  # fmt: skip
+    now, asked, of = Present(*present), Asked(*earlier), Asking(*plain)
+    n, stood, own, polar = len(now.points), scratch[0], scratch[1], scratch[2:]
+    in_view = _emptied(now, asked, of, polar, own, stood)
+    _indexed(now, of.step, bins)
+    start = 0
+    for j in range(len(asked.ages)):
+        if asked.ages[j] <= of.left_s:
+            before = asked.points[start : asked.ends[j]]
+            _left(before, asked.ages[j], now, of, bins, polar, stood)
+        start = asked.ends[j]
     for k in range(n):
         ratio = of.settled_s / max(stood[k], 1e-300)
         own[k] = 1.0 - of.sure * (1.0 - 1.0 / (1.0 + ratio * ratio))
-    _along(points, joined, own, of.along_m, of.thin_m, scratch[2], out)
+    _along(now, of, own, scratch[2], out)
     return in_view / n

@@ -14,12 +14,13 @@ from typing import TypeAlias
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
+from slam.frontend.odometry_prior import rotated
 from slam.posegraph import Edge, Pose
 from slam.tracker.tracking.keys import KeyFrame
+from slam.tracker.uncertainty.covariances import whole
 
-UPPER = [0, 1, 2, 4, 5, 8]  # of (3, 3), row by row; ``WHOLE``: places in these six
-WHOLE = [0, 1, 2, 1, 3, 4, 2, 4, 5]
+UPPER = [0, 1, 2, 4, 5, 8]  # of (3, 3), row by row
 LEVER_M = 5.0  # an error of the heading counts as what it does to a place so far away
 
 Upper: TypeAlias = tuple[float, float, float, float, float, float]  # of (3, 3), row by row
@@ -75,7 +76,7 @@ def map_errors(
                 best = driven = closed
                 T_map_graph = _moved(here, solved[k])
         errors.append(best)
-    return np.array(errors)[:, WHOLE].reshape(-1, 3, 3)
+    return whole(np.array(errors))
 
 
 def _composed(T: Pose, pose: Pose) -> Pose:
@@ -114,9 +115,7 @@ def _turned(covariance: Upper, theta: float) -> Upper:
     """``odometry_prior.turned``."""
     c, s = math.cos(theta), math.sin(theta)
     xx, xy, xt, yy, yt, tt = covariance
-    a = c * c * xx - 2.0 * c * s * xy + s * s * yy
-    b = c * s * (xx - yy) + (c * c - s * s) * xy
-    d = s * s * xx + 2.0 * c * s * xy + c * c * yy
+    a, b, d = rotated(c, s, xx, xy, yy)
     return a, b, c * xt - s * yt, d, s * xt + c * yt, tt
 
 

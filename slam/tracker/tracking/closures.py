@@ -12,7 +12,7 @@ from collections.abc import Callable, Generator, Iterable
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge
@@ -26,7 +26,7 @@ from slam.tracker.matching.whole_search import WholeSearch
 from slam.tracker.rasterise import rasterise, seen_at
 from slam.tracker.tracking.keys import KeyFrame
 from slam.tracker.uncertainty.covariances import carried, observable
-from slam.tracker.uncertainty.residuals import look
+from slam.tracker.uncertainty.residuals import residuals_of
 
 # What things cost, in units of drawing one key frame; measured on logs of 5 cm, 180 and 361 beams.
 UNIT_NS = 400_000  # of the counted price of a search, which is that of a slower machine
@@ -191,7 +191,7 @@ class Closures:
         geometry, feigned = np.zeros((3, 3)), 0.0
         step = max(1, len(seen.points_robot) // numbers.residuals.samples)
         for turn in range(0, step, -(-step // SAMPLES)):
-            one = look(cell_map, short_term, seen, match.T_map_robot, (1.0, 0.0), turn)
+            one = residuals_of(cell_map, short_term, seen, match.T_map_robot, (1.0, 0.0), turn)
             geometry, feigned = geometry + one.geometry, feigned + one.feigned
         out, information = np.empty((3, 3)), match.tau * match.information
         unobservable, along_rad = observable(geometry, feigned, numbers.pose.noisy, out)

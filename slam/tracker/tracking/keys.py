@@ -7,7 +7,7 @@ from dataclasses import dataclass, replace
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.motions import extended
 from slam.frontend.observations import Observations
 from slam.tracker.belief.places import spread
@@ -90,7 +90,7 @@ class KeyFrames:
             KeyFrame(
                 frame=frame,
                 T_map_robot=T_map_robot,
-                observations=seen.with_votes(None),
+                observations=seen.weighted(None),
                 step=self._step,
                 covariance=self._covariance + self.slack,
                 way_m=self.way_m,

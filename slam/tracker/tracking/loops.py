@@ -17,7 +17,7 @@ from functools import partial
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.odometry_prior import inverted
 from slam.posegraph import Edge, Relaxation, carried, least_moved
 from slam.tracker.belief.places import coarse, spread

@@ -12,10 +12,9 @@ from dataclasses import replace
 from typing import TypeVar
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Bools, Float, Ints
 from slam.frontend.odometry_prior import inverted, turned
 from slam.posegraph import Edge
 from slam.tracker.tracking.config import LoopsConfig
@@ -33,7 +32,7 @@ class Merge:
     into  (n,) new number of the one that stands for each
     """
 
-    def __init__(self, stand: NDArray[np.int64]) -> None:
+    def __init__(self, stand: Ints) -> None:
         """``stand`` (n,): the key frame that stands for each, itself or an older one."""
         self.left = np.flatnonzero(stand == np.arange(len(stand)))
         self.into = np.searchsorted(self.left, stand)
@@ -42,7 +41,7 @@ class Merge:
     def of(
         cls,
         poses: Float,
-        written: NDArray[np.bool_],
+        written: Bools,
         tied: Iterable[int],
         searched: int,
         config: LoopsConfig,
@@ -106,8 +105,8 @@ class Merge:
 
 
 def _standing(
-    poses: Float, written: NDArray[np.bool_], may_go: list[int], near_m: float, near_rad: float
-) -> NDArray[np.int64]:
+    poses: Float, written: Bools, may_go: list[int], near_m: float, near_rad: float
+) -> Ints:
     """(n,) the key frame that stands for each of ``poses`` (n, 3): the nearest older one."""
     stand, left = np.arange(len(poses)), written.copy()
     for k in may_go:

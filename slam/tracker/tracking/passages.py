@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.posegraph import Edge
 from slam.tracker.tracking.config import LoopsConfig
 from slam.tracker.tracking.keys import KeyFrame

@@ -7,7 +7,7 @@ from dataclasses import dataclass
 import numpy as np
 
 from slam import se2
-from slam.frames import Float
+from slam.arrays import Float
 from slam.posegraph import relative
 from slam.tracker.cell_map import CellMap
 from slam.tracker.map_config import MapConfig

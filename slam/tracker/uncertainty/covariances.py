@@ -7,20 +7,35 @@ Element by element: whole-array expressions take seconds to compile.
 import math
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, njit
+from slam.arrays import Float
 from slam.frontend.odometry_prior import inverse
+
+WHOLE = np.array([0, 1, 2, 1, 3, 4, 2, 4, 5])  # places in the upper triangle, of all nine
+
+
+def whole(upper: Float) -> Float:
+    """(..., 3, 3) of the upper triangles (..., 6) of symmetric matrices, row by row."""
+    out: Float = upper[..., WHOLE].reshape(*upper.shape[:-1], 3, 3)
+    return out
 
 
 @inner
-def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.float64]) -> None:
-    """out = f p f' for a symmetric (3, 3) p, exactly symmetric."""
-    half = np.zeros((3, 3))
+def product(f: Float, p: Float) -> Float:
+    """f p of (3, 3) matrices."""
+    out = np.zeros((3, 3))
     for i in range(3):
         for j in range(3):
             for k in range(3):
-                half[i, j] += f[i, k] * p[k, j]
+                out[i, j] += f[i, k] * p[k, j]
+    return out
+
+
+@inner
+def _sandwich(f: Float, p: Float, out: Float) -> None:
+    """out = f p f' for a symmetric (3, 3) p, exactly symmetric; it may be p itself."""
+    half = product(f, p)
     for i in range(3):
         for j in range(i, 3):
             total = 0.0
@@ -30,7 +45,15 @@ def _sandwich(f: NDArray[np.float64], p: NDArray[np.float64], out: NDArray[np.fl
 
 
 @inner
-def plus(a: NDArray[np.float64], share: float, b: NDArray[np.float64]) -> NDArray[np.float64]:
+def inverse_of(m: Float) -> Float:
+    """``odometry_prior.inverted``."""
+    out = np.empty((3, 3))
+    inverse(m, out)
+    return out
+
+
+@inner
+def plus(a: Float, share: float, b: Float) -> Float:
     """a + share b."""
     out = np.empty((3, 3))
     for i in range(3):
@@ -40,9 +63,7 @@ def plus(a: NDArray[np.float64], share: float, b: NDArray[np.float64]) -> NDArra
 
 
 @njit
-def observable(
-    geometry: NDArray[np.float64], feigned: float, noisy: float, out: NDArray[np.float64]
-) -> tuple[int, float]:
+def observable(geometry: Float, feigned: float, noisy: float, out: Float) -> tuple[int, float]:
     """``geometry`` without ``noisy`` times what noise feigns of it (``out``).
 
     Returns the number of directions of position in which nothing is left, and the angle (rad) of
@@ -70,12 +91,7 @@ def observable(
 
 
 @inner
-def root_share(
-    part: tuple[float, float, float],
-    whole: NDArray[np.float64],
-    times: float,
-    out: NDArray[np.float64],
-) -> None:
+def root_share(part: tuple[float, float, float], whole: Float, times: float, out: Float) -> None:
     """``out[:2, :2]``: root of ``times`` the share, at most 1, that ``part`` has of ``whole``.
 
     Both are symmetric, ``part`` by xx, xy, yy; the share is taken along the axes of ``whole``.
@@ -94,57 +110,34 @@ def root_share(
 
 
 @inner
-def advance(  # noqa: C901, PLR0913 (kernel)
-    drift: NDArray[np.float64],
-    blind: NDArray[np.float64],
-    shared: NDArray[np.float64],
-    newest: NDArray[np.float64],
-    motion: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    data: NDArray[np.float64],
-    variances: tuple[float, float, float, float],
-    written: NDArray[np.float64],
-) -> None:
+def advance(  # noqa: PLR0913 (kernel)
+    drift: Float, blind: Float, shared: Float, newest: Float, motion: Float, prior: Float,
+    data: Float, variances: tuple[float, float, float, float], written: Float,
+) -> None:  # fmt: skip
     """One frame; all arrays (3, 3) in the map frame, changed in place but the last three.
 
     ``data``: information of the match, with the weight it was given. ``variances``: per unit of
     information, of the shared error and of what is newly written; frames in which the first stays;
     by how much less (standard deviation) surfaces agree in their error of the heading. ``written``
     (3, 3): root of the share of the map in view that was written lately, by directions; it is off
-    by what odometry was off then. Of what the data take off odometry's error, so much is the map's
-    from now on.
+    by what odometry was off then. What the data take off odometry's error is the map's by as much.
     """
-    F, N = np.zeros((3, 3)), np.empty((3, 3))
-    F[0, 0] = F[1, 1] = F[2, 2] = 1.0
-    F[0, 2], F[1, 2] = -motion[1], motion[0]
-    precision, M, moved = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    _sandwich(F, drift, moved)
+    F, unit, kept = np.zeros((3, 3)), np.zeros((3, 3)), np.empty((3, 3))
     for i in range(3):
-        for j in range(3):
-            drift[i, j] = moved[i, j]
+        F[i, i] = unit[i, i] = 1.0
+    F[0, 2], F[1, 2] = -motion[1], motion[0]
+    _sandwich(F, drift, drift)
     # odometry's: what the data leave of it
+    moved = np.empty((3, 3))
     _sandwich(F, blind, moved)
     whole = plus(moved, 1.0, prior)
-    inverse(whole, precision)
-    inverse(plus(data, 1.0, precision), M)
-    for i in range(3):
-        for j in range(3):
-            N[i, j] = M[i, 0] * precision[0, j] + M[i, 1] * precision[1, j]
-            N[i, j] += M[i, 2] * precision[2, j]
-    _sandwich(N, whole, blind)
-    kept = np.empty((3, 3))
-    for i in range(3):
-        for j in range(3):
-            N[i, j] = (1.0 if i == j else 0.0) - N[i, j]
-    _sandwich(N, moved, kept)
-    _sandwich(written, kept, moved)
-    for i in range(3):
-        for j in range(3):
-            kept[i, j] = moved[i, j]
-    inverse(prior, precision)
+    precision = inverse_of(whole)
+    left = product(inverse_of(plus(data, 1.0, precision)), precision)
+    _sandwich(left, whole, blind)
+    _sandwich(plus(unit, -1.0, left), moved, kept)
+    _sandwich(written, kept, kept)
     # the shared error, as far as the data decide over the time that it stays the same
-    inverse(plus(data, 1.0 / variances[2], precision), M)
-    _sandwich(M, data, moved)
+    _sandwich(inverse_of(plus(data, 1.0 / variances[2], inverse_of(prior))), data, moved)
     for i in range(3):
         for j in range(3):
             turns = (variances[3] if i == 2 else 1.0) * (variances[3] if j == 2 else 1.0)
@@ -155,60 +148,37 @@ def advance(  # noqa: C901, PLR0913 (kernel)
 
 @njit
 def followed(  # noqa: PLR0913 (kernel)
-    drift: NDArray[np.float64],
-    blind: NDArray[np.float64],
-    shared: NDArray[np.float64],
-    newest: NDArray[np.float64],
-    T_map_before: NDArray[np.float64],
-    T_map_robot: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    geometry: NDArray[np.float64],
-    written: tuple[float, float, float, float, float],
-    matched: tuple[float, float, float, float],
-    variances: tuple[float, float, float, float],
-    out: NDArray[np.float64],
-) -> tuple[int, float]:
-    """One frame: ``root_share`` and ``observable`` of ``geometry``, then ``advance``; their sum in
-    ``out`` (3, 3). Returns what ``observable`` does, and (2, 0) where no match was used.
+    drift: Float, blind: Float, shared: Float, newest: Float, motion: Float, prior: Float,
+    geometry: Float, written: tuple[float, float, float, float, float],
+    matched: tuple[float, float, float, float], variances: tuple[float, float, float, float],
+) -> tuple[int, float]:  # fmt: skip
+    """One frame: ``root_share`` and ``observable`` of ``geometry``, then ``advance``.
+
+    Returns what ``observable`` does, and (2, 0) where no match was used.
 
     written  the part of ``root_share``, its times (0: nothing was), and the same share of headings
     matched  strength of the match (0: not used), 1 over the weight of ``geometry``, and the other
              two numbers of ``observable``
     """
-    share, data = np.zeros((3, 3)), np.zeros((3, 3))
+    nothing, share, data = np.zeros((3, 3)), np.zeros((3, 3)), np.zeros((3, 3))
     if written[3] > 0.0:
         root_share((written[0], written[1], written[2]), geometry, written[3], share)
         share[2, 2] = math.sqrt(min(written[3] * written[4], 1.0))
-    motion, view = np.empty(3), np.empty((3, 3))
-    strength = matched[0]
     lost, along = 2, 0.0
-    if strength > 0.0:
+    if matched[0] > 0.0:
+        view = plus(nothing, matched[1], geometry)
+        lost, along = observable(view, matched[2], matched[3], data)
+        data = plus(nothing, matched[0], data)
+    else:
         for i in range(3):
             for j in range(3):
-                view[i, j] = geometry[i, j] * matched[1]
-        lost, along = observable(view, matched[2], matched[3], data)
-    for i in range(3):
-        motion[i] = T_map_robot[i] - T_map_before[i]
-        for j in range(3):
-            if strength > 0.0:
-                data[i, j] *= strength
-            else:
                 blind[i, j] += shared[i, j]
     advance(drift, blind, shared, newest, motion, prior, data, variances, share)
-    for i in range(3):
-        for j in range(3):
-            out[i, j] = drift[i, j] + blind[i, j] + shared[i, j]
     return lost, along
 
 
 @njit
-def carried(
-    covariance: NDArray[np.float64],
-    motion: NDArray[np.float64],
-    x: float,
-    y: float,
-    out: NDArray[np.float64],
-) -> None:
+def carried(covariance: Float, motion: Float, x: float, y: float, out: Float) -> None:
     """``out``: a pose's covariance (3, 3) after a known ``motion`` (3,), both in the map frame.
 
     Without the part along the unit vector (x, y); (0, 0): all of it.

@@ -10,59 +10,52 @@ in a row that odometry cannot have led to, its next increments may be off by as 
 """
 
 import math
-from typing import Self
+from typing import NamedTuple, Self
 
 import numpy as np
-from numpy.typing import NDArray
 
-from slam._jit import inner, njit
-from slam.frames import Float, Odometry
+from slam._jit import njit
+from slam.arrays import Float
+from slam.frames import Odometry
 from slam.frontend.heading_bias import HeadingBias
-from slam.frontend.odometry_prior import (
-    Prediction,
-    inverse,
-    predict,
-    squared,
-    turn,
-)  # fmt: skip
+from slam.frontend.odometry_prior import Prediction, predict, squared, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
-from slam.tracker.uncertainty.covariances import plus
+from slam.tracker.uncertainty.covariances import inverse_of, plus
 
 SLIP = 12.0  # squared innovation of three numbers that noise exceeds in 0.7 %; set by hand
 SLIP_S = 0.2  # s that a slip lasts in the mean; set by hand: station, 0.6 rad in 0.6 s
 SLIP_STEP_S = 0.15  # s, longest step: slower scans see no slip twice
 
 
-@inner
-def _across(covariance: NDArray[np.float64], across: tuple[float, float]) -> float:
-    """Variance of the position along a unit vector; of both directions where that is zero."""
-    a, b, d = covariance[0, 0], covariance[0, 1], covariance[1, 1]
-    x, y = across
-    if x == 0.0 and y == 0.0:
-        return float(a + d)
-    return float(x * x * a + 2.0 * x * y * b + y * y * d)
+class Innovation(NamedTuple):
+    """What the correction of a matched pose says about the covariance that was stated.
+
+    nis      normalised square
+    place    m^2 of the position; ``heading`` rad^2
+    match_m2, match_rad2  variances of the match itself
+    """
+
+    nis: float
+    place: float
+    heading: float
+    match_m2: float
+    match_rad2: float
 
 
 @njit
 def innovation(
-    stated: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    data: NDArray[np.float64],
-    off: NDArray[np.float64],
-    share: float,
-    across: tuple[float, float],
-) -> tuple[float, float, float, float, float]:
-    """What the correction ``off`` of a pose matched with ``prior`` says about what is ``stated``.
+    stated: Float, prior: Float, data: Float, off: Float, share: float, across: tuple[float, float]
+) -> Innovation:
+    """Of the correction ``off`` of a pose matched with ``prior``.
 
     ``data`` is the information with which the match corrected, ``share`` how much of the variance
     that claims it really has. The innovation e is what a match alone would have said: off = K e, so
-    e = off + R inv(P) off. Returns its NIS, its squares in position and heading, and the match's
-    variances there; of the position only along the unit vector ``across`` unless that is zero.
+    e = off + R inv(P) off. Of the position only along the unit vector ``across``, unless that is
+    zero.
     """
-    precision, R, S = np.empty((3, 3)), np.empty((3, 3)), np.empty((3, 3))
-    inverse(prior, precision)
-    inverse(plus(data, 1e-3, precision), R)
+    precision = inverse_of(prior)
+    R = inverse_of(plus(data, 1e-3, precision))
     pulled, e = np.zeros(3), np.zeros(3)
     for i in range(3):
         for k in range(3):
@@ -71,7 +64,7 @@ def innovation(
         e[i] = off[i]
         for k in range(3):
             e[i] += R[i, k] * pulled[k]
-    inverse(plus(stated, share, R), S)
+    S = inverse_of(plus(stated, share, R))
     nis = 0.0
     for i in range(3):
         for k in range(3):
@@ -81,34 +74,14 @@ def innovation(
     if x != 0.0 or y != 0.0:
         place = (x * e[0] + y * e[1]) ** 2
         variance = x * x * R[0, 0] + 2.0 * x * y * R[0, 1] + y * y * R[1, 1]
-    return nis, place, e[2] * e[2], share * variance, share * R[2, 2]
+    return Innovation(nis, place, e[2] * e[2], share * variance, share * R[2, 2])
 
 
-@njit
-def compared(  # noqa: PLR0913 (kernel)
-    covariance: NDArray[np.float64],
-    carried: NDArray[np.float64],
-    prior: NDArray[np.float64],
-    unscaled: NDArray[np.float64],
-    start: float,
-    data: NDArray[np.float64],
-    off: NDArray[np.float64],
-    share: float,
-    across: tuple[float, float],
-) -> tuple[float, float, float, float, float, float, float, float, float]:
-    """``innovation`` of an increment with that ``covariance`` from a pose off by what odometry
-    ``carried`` there; then, of the step as stated (``unscaled``, in axes turned by -start) and of
-    what was carried, the variances of position (see ``across``) and of heading.
-    """
-    step = np.empty((3, 3))
-    turn(unscaled, start, step)
-    nis, place, heading, of_place, of_heading = innovation(
-        plus(covariance, 1.0, carried), prior, data, off, share, across
-    )
-    return (
-        nis, place, heading, of_place, of_heading,
-        _across(step, across), step[2, 2], _across(carried, across), carried[2, 2],
-    )  # fmt: skip
+def _variances(covariance: Float, across: tuple[float, float]) -> tuple[float, float]:
+    """Of position, along a unit vector or both ways where that is zero, and of heading."""
+    (a, b, _), (_, d, _), (_, _, heading) = covariance.tolist()
+    x, y = across
+    return (x * x * a + 2.0 * x * y * b + y * y * d if x or y else a + d), heading
 
 
 class OdometryNoise:
@@ -209,22 +182,23 @@ class OdometryNoise:
         share = min(match.tau * self.noise_share(sensor_sigma_m), 1.0)
         across = (0.0, 0.0) if along_rad is None else (-math.sin(along_rad), math.cos(along_rad))
         start = float(prediction.T_map_robot[2]) - float(prediction.increment[2])
-        self.nis, place, heading, of_match, match_rad2, of_place, c, of_carried, t = compared(
-            prediction.covariance, prediction.carried, prediction.prior, prediction.unscaled,
-            start, data, off, share, across,
-        )  # fmt: skip
+        stated = prediction.covariance + prediction.carried
+        found = innovation(stated, prediction.prior, data, off, share, across)
+        self.nis = found.nis
+        step_m2, step_rad2 = _variances(turned(prediction.unscaled, start), across)
+        carried_m2, carried_rad2 = _variances(prediction.carried, across)
         floor_m2, floor_rad2 = prediction.floor
         floors_m2 = floor_m2 * (2.0 if along_rad is None else 1.0)
         config = self._config
         frames = max(config.memory, config.memory_s / max(prediction.elapsed, 1e-3))
         keep = math.exp(-1.0 / frames)
         scales: list[float] = self.scales.tolist()
-        for k, found, unit, rest in (
-            (0, place, of_place, floors_m2 + of_carried + of_match),
-            (1, heading, c, floor_rad2 + t + match_rad2),
+        for k, squared_off, unit, rest in (
+            (0, found.place, step_m2, floors_m2 + carried_m2 + found.match_m2),
+            (1, found.heading, step_rad2, floor_rad2 + carried_rad2 + found.match_rad2),
         ):
             expected = scales[k] * unit + rest
-            square = min(found, config.wild * expected)
+            square = min(squared_off, config.wild * expected)
             # Least squares of square = scale * unit + rest, weighed by what scatter to expect.
             weight = unit / expected**2
             self._squares[k] = keep * self._squares[k] + weight * (square - rest)
@@ -234,5 +208,5 @@ class OdometryNoise:
         if self.bias is not None and self._stated:
             # an assumed variance says nothing of what is bias and what is chance
             variances = float(prediction.covariance[2, 2]), float(prediction.prior[2, 2])
-            found_out = match.matched, float(off[2]), data
-            self.bias.learn(prediction.increment, prediction.elapsed, variances, found_out)
+            heading = match.matched, float(off[2]), data
+            self.bias.learn(prediction.increment, prediction.elapsed, variances, heading)

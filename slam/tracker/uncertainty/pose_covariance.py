@@ -19,12 +19,12 @@ from collections.abc import Callable
 
 import numpy as np
 
-from slam.frames import Float
+from slam.arrays import Float
 from slam.frontend.odometry_prior import Prediction, turned
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match
 from slam.tracker.uncertainty.covariances import carried, followed
-from slam.tracker.uncertainty.residuals import Evidence
+from slam.tracker.uncertainty.residuals import Residuals
 
 LEAST = 1e-9  # m^2: numerical guard
 SINGULAR = np.diag([1e-6, 1e-6, 1e-8])  # m^2, m^2, rad^2: numerical guard
@@ -56,11 +56,9 @@ class PoseCovariance:
         self._lattice = (numbers.lattice_cells * config.cell_m) ** 2
         self._products, self._pairs = numbers.at_first * numbers.usual_m**2, numbers.at_first
         self._geometry: Float = np.zeros((3, 3))
-        self._new_geometry = [0.0, 0.0, 0.0]
+        self._recent: Float = np.zeros(7)  # ``Residuals.recent``
         self.unseen_s = 0.0
         self.shared_m2 = numbers.usual_m**2
-        self._feigned, self._weighed = 0.0, 0.0
-        self._in_view, self._looks = 0.0, 0.0
         self._drift: Float = np.zeros((3, 3))
         self._blind: Float = np.zeros((3, 3))
         self._shared: Float = np.zeros((3, 3))
@@ -97,46 +95,41 @@ class PoseCovariance:
         return out
 
     def update(
-        self, T_map_before: Float, prediction: Prediction, match: Match, evidence: Evidence | None
+        self, T_map_before: Float, prediction: Prediction, match: Match, residuals: Residuals | None
     ) -> None:
         """Take the motion from ``T_map_before`` and the match at its end in.
 
-        Without ``evidence`` the match was not used: odometry alone moved the robot.
+        Without ``residuals`` the match was not used: odometry alone moved the robot.
         """
         config, elapsed = self._config, prediction.elapsed
         strength, new, times = 0.0, 0.0, 0.0
-        if evidence is not None:
-            self._learn(evidence, elapsed)
+        if residuals is not None:
+            self._learn(residuals, elapsed)
             (xx, _, _), (_, yy, _), _ = match.information.tolist()
             strength = match.tau * (xx + yy)
-            new = evidence.new / max(evidence.weighed, 1e-9)
+            new = residuals.new / max(residuals.weighed, 1e-9)
             times = config.written
-        used = strength > 0.0 and self._weighed > config.forgotten
-        weight = 1.0 / self._weighed if used else 0.0
-        feigned = self._feigned / self._weighed if used else 0.0
+        new_xx, new_xy, new_yy, feigned, weighed, in_view, looks = self._recent.tolist()
+        used = strength > 0.0 and weighed > config.forgotten
+        weight = 1.0 / weighed if used else 0.0
+        feigned = feigned / weighed if used else 0.0
         # the usual one where nothing was seen for so long that the sums are used up
         shared = max(self._products, 0.0) + config.forgotten * config.usual_m**2
         self.shared_m2 = shared / (self._pairs + config.forgotten)
         # by how much shared errors of surfaces average out less than in a whole room
-        seen = self._in_view / max(self._looks, config.forgotten)
+        seen = in_view / max(looks, config.forgotten)
         fewer = max(self._whole / max(seen, config.least_share * config.room_weight), 1.0)
         variance = (self._lattice + config.shared_times**2 * self.shared_m2) * fewer
         frames = max(1.0, config.correlated_s / max(elapsed, 1e-3))
-        a, b, d = self._new_geometry
-        self.covariance = np.empty((3, 3))
+        of_new = config.new_times**2 * new * variance * strength
         self.unobservable, along = followed(
             self._drift, self._blind, self._shared, self.newest_drift,
-            T_map_before, prediction.T_map_robot, prediction.covariance, self._geometry,
-            (a, b, d, times, new),
+            prediction.T_map_robot - T_map_before, prediction.covariance, self._geometry,
+            (new_xx, new_xy, new_yy, times, new),
             (strength if used else 0.0, weight, feigned, config.noisy),
-            (
-                variance * strength,
-                config.new_times**2 * new * variance * strength,
-                frames,
-                config.turn_times,
-            ),
-            self.covariance,
+            (variance * strength, of_new, frames, config.turn_times),
         )  # fmt: skip
+        self.covariance = self._drift + self._blind + self._shared
         self.along_rad = along if self.unobservable == 1 else None
         faded = math.exp(-elapsed / config.view_s)
         self.unseen_s = self.unseen_s + elapsed if self.unobservable else self.unseen_s * faded
@@ -174,24 +167,19 @@ class PoseCovariance:
         """The map frame was turned by ``by`` rad, and the robot with it."""
         self._drift, self._blind = turned(self._drift, by), turned(self._blind, by)
         self._shared, self._geometry = turned(self._shared, by), turned(self._geometry, by)
-        xx, xy, yy = self._new_geometry
+        xx, xy, yy = self._recent[:3].tolist()
         part = turned(np.array([[xx, xy, 0.0], [xy, yy, 0.0], [0.0, 0.0, 0.0]]), by)
-        self._new_geometry = [float(part[0, 0]), float(part[0, 1]), float(part[1, 1])]
+        self._recent[:3] = part[0, 0], part[0, 1], part[1, 1]
         self.along_rad = None if self.along_rad is None else self.along_rad + by
         self.covariance = self._drift + self._blind + self._shared
 
-    def _learn(self, evidence: Evidence, elapsed: float) -> None:
+    def _learn(self, residuals: Residuals, elapsed: float) -> None:
         keep = math.exp(-elapsed / self._config.shared_s)
-        self._products = keep * self._products + evidence.shared
-        self._pairs = keep * self._pairs + evidence.paired
+        self._products = keep * self._products + residuals.shared
+        self._pairs = keep * self._pairs + residuals.paired
         keep = math.exp(-elapsed / self._config.view_s)
-        self._geometry = keep * self._geometry + evidence.geometry
-        more = evidence.new_geometry.tolist()
-        self._new_geometry = [keep * a + b for a, b in zip(self._new_geometry, more, strict=True)]
-        self._feigned = keep * self._feigned + evidence.feigned
-        self._weighed = keep * self._weighed + evidence.weighed
-        self._in_view = keep * self._in_view + evidence.in_view
-        self._looks = keep * self._looks + 1.0
+        self._geometry = keep * self._geometry + residuals.geometry
+        self._recent = keep * self._recent + residuals.recent
 
 
 def _far(covariance: Float) -> float:

@@ -15,20 +15,20 @@ from dataclasses import dataclass
 from typing import Any, NamedTuple
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam._jit import inner, uncounted
-from slam.frames import Float
+from slam.arrays import Bools, Float
 from slam.frontend.observations import Observations
 from slam.tracker.cell_map import CellMap
-from slam.tracker.cells import MASK, MOST_OFF, SHIFT, Cells, named
+from slam.tracker.cells import MASK, MOST_OFF, Cells, activity, slot_of
+from slam.tracker.uncertainty.covariances import whole
 
 # places in the sums of ``_look``
 SHARED, PAIRED, FEIGNED, NEW, WEIGHED, NEW_XX, NEW_XY, NEW_YY = range(8)
 OLD_S = 8.0  # s for which a surface was looked at, at which it counts half as old; set by hand
 
 
-NO_VOTES = np.empty(0)
+NO_WEIGHTS = np.empty(0)
 
 
 class Pairing(NamedTuple):
@@ -49,7 +49,7 @@ def _offset(  # noqa: PLR0913 (kernel)
     v: float,
     variance: float,
     faint_overlap: float,
-    out: NDArray[np.float64],
+    out: Float,
 ) -> bool:
     """How far the point (u, v) lies off the mapped surface (``out``); False where there is none.
 
@@ -58,25 +58,18 @@ def _offset(  # noqa: PLR0913 (kernel)
     p = 1.0 / variance
     wide = 3.0 * math.sqrt(variance)
     i0, i1 = math.ceil(u - wide), math.floor(u + wide)
-    rows, columns = cells.directory.shape
     falling = math.exp(-p)
     m0 = mu = mv = 0.0
     for j in range(math.ceil(v - wide), math.floor(v + wide) + 1):
-        row = (j >> SHIFT) - cells.corner[1]
-        if row < 0 or row >= rows:
-            continue
         dv, du = j - v, i0 - u
         kernel = math.exp(-0.5 * p * (du * du + dv * dv))
         ratio = math.exp(-p * (du + 0.5))
-        column_before, slot = -1, -1
+        slot = slot_of(cells, i0, j)
         for i in range(i0, i1 + 1):
-            column = (i >> SHIFT) - cells.corner[0]
-            if column != column_before:
-                column_before = column
-                slot = cells.directory[row, column] if 0 <= column < columns else -1
+            if i & MASK == 0:  # another block
+                slot = slot_of(cells, i, j)
             if slot >= 0:
-                x, y = cells.x[slot, j & MASK, i & MASK], cells.y[slot, j & MASK, i & MASK]
-                value = kernel * (y + (1.0 - y) * short_term * x)
+                value = kernel * activity(cells, short_term, slot, j & MASK, i & MASK)
                 m0 += value
                 mu += value * du
                 mv += value * dv
@@ -93,11 +86,7 @@ def _offset(  # noqa: PLR0913 (kernel)
 def _age(cells: Cells, u: float, v: float) -> float:
     """For how long, s, the cell nearest to (u, v) was looked at; 0 where none lives."""
     i, j = math.floor(u + 0.5), math.floor(v + 0.5)
-    row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
-    rows, columns = cells.directory.shape
-    if row < 0 or column < 0 or row >= rows or column >= columns:
-        return 0.0
-    slot = cells.directory[row, column]
+    slot = slot_of(cells, i, j)
     return float(cells.age[slot, j & MASK, i & MASK]) if slot >= 0 else 0.0
 
 
@@ -109,13 +98,9 @@ def _old(cells: Cells, u: float, v: float) -> tuple[float, float]:
     by how much, m, the map was off when that cell became long known, inf: unknown.
     """
     most, off = 0.0, 0.0
-    rows, columns = cells.directory.shape
     for j in range(math.floor(v - 0.5), math.floor(v - 0.5) + 3):
         for i in range(math.floor(u - 0.5), math.floor(u - 0.5) + 3):
-            row, column = (j >> SHIFT) - cells.corner[1], (i >> SHIFT) - cells.corner[0]
-            if row < 0 or column < 0 or row >= rows or column >= columns:
-                continue
-            slot = cells.directory[row, column]
+            slot = slot_of(cells, i, j)
             if slot >= 0:
                 age = float(cells.age[slot, j & MASK, i & MASK]) / OLD_S
                 share = age * age / (age * age + 1.0)
@@ -127,7 +112,7 @@ def _old(cells: Cells, u: float, v: float) -> tuple[float, float]:
 
 @inner
 def _partner(
-    points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
+    points: Float, joined: Bools, laser: Float,
     first: int, pairing: Pairing,
 ) -> int:  # fmt: skip
     """A point of the same straight surface, far enough from ``first``; -1: there is none."""
@@ -153,9 +138,7 @@ def _partner(
 
 
 @inner
-def _free_standing(
-    points: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64], k: int
-) -> bool:
+def _free_standing(points: Float, joined: Bools, laser: Float, k: int) -> bool:
     """Whether point ``k`` is a thing of its own: joined to nothing and nearer than its neighbours.
 
     Where a wall is seen at so grazing an angle that its hits are far apart, they are neither.
@@ -175,17 +158,16 @@ def _free_standing(
 @uncounted
 def _look(  # noqa: PLR0913, PLR0915 (kernel)
     arrays: tuple[Any, ...], short_term: float, cell: float,
-    points: NDArray[np.float64], covariances: NDArray[np.float64], weights: NDArray[np.float64],
-    votes: NDArray[np.float64], joined: NDArray[np.bool_], laser: NDArray[np.float64],
-    pose: NDArray[np.float64], start: int, step: int, times: tuple[float, float, float],
-    numbers: tuple[float, float, float, float, float], off: NDArray[np.float64],
-    geometry: NDArray[np.float64], sums: NDArray[np.float64], old: NDArray[np.float64],
+    points: Float, covariances: Float, shares: Float,
+    weights: Float, joined: Bools, laser: Float,
+    pose: Float, start: int, step: int, times: tuple[float, float, float],
+    numbers: tuple[float, float, float, float, float], off: Float,
+    geometry: Float, sums: Float, old: Float,
 ) -> None:  # fmt: skip
-    """Add up what ``Evidence`` holds; ``times``: s of one look, of a trace's prior age, and
+    """Add up what ``Residuals`` holds; ``times``: s of one look, of a trace's prior age, and
     since all directions of position were seen. ``arrays`` of ``Cells``, ``numbers`` of ``Pairing``;
-    no ``votes``: all have one. ``off`` (2,): room to work in."""
-    cells = named(arrays)
-    pairing = Pairing(numbers[0], numbers[1], numbers[2], numbers[3], numbers[4])
+    no ``weights``: all have one. ``off`` (2,): room to work in."""
+    cells, pairing = Cells(*arrays), Pairing(*numbers)
     c, s = math.cos(pose[2]), math.sin(pose[2])
     surfaces = False
     for k in range(len(joined)):
@@ -200,7 +182,7 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
         if k < 0 and surfaces and not _free_standing(points, joined, laser, first):
             continue
         # what moves says nothing of how far the map is off, nor is it new map
-        w = weights[first] * votes[first] if len(votes) > 0 else weights[first]
+        w = shares[first] * weights[first] if len(weights) > 0 else shares[first]
         sums[WEIGHED] += w
         age = _age(cells, u, v) + times[0] + times[1]
         sums[NEW] += w * times[0] / age
@@ -220,34 +202,23 @@ def _look(  # noqa: PLR0913, PLR0915 (kernel)
                 sums[PAIRED] += w
             sums[FEIGNED] += w * min(2.0 * (pairing.sensor_sigma / length) ** 2, 0.5)
         a, b, d = w * a, w * b, w * d
-        geometry[0, 0] += a
-        geometry[0, 1] += b
-        geometry[1, 1] += d
         sums[NEW_XX] += new * a
         sums[NEW_XY] += new * b
         sums[NEW_YY] += new * d
-        e, f = b * rx - a * ry, d * rx - b * ry
-        h = a * ry * ry - 2.0 * b * rx * ry + d * rx * rx
-        geometry[0, 2] += e
-        geometry[1, 2] += f
-        geometry[2, 2] += h
+        turned = a * ry * ry - 2.0 * b * rx * ry + d * rx * rx
+        part = (a, b, b * rx - a * ry, d, d * rx - b * ry, turned)
+        for q in range(6):
+            geometry[q] += part[q]
+            old[q] += o * part[q]
         old[6] += o * w
         if o * w > 0.0:
             old[7] += o * w * old_off * old_off
-        old[0] += o * a
-        old[1] += o * b
-        old[2] += o * e
-        old[3] += o * d
-        old[4] += o * f
-        old[5] += o * h
-    geometry[1, 0], geometry[2, 0] = geometry[0, 1], geometry[0, 2]
-    geometry[2, 1] = geometry[1, 2]
     for k in range(6):
         old[k] *= step  # of all points in view
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Evidence:
+class Residuals:
     """What a sample of one frame's points shows.
 
     geometry  (3, 3) weighted sum over matched points of the outer product of their normal's
@@ -277,15 +248,21 @@ class Evidence:
     old: Float
     old_off_m2: float
 
+    @property
+    def recent(self) -> Float:
+        """(7,) ``new_geometry``, feigned, weighed, in_view, and 1 look."""
+        rest = self.feigned, self.weighed, self.in_view, 1.0
+        return np.array([*self.new_geometry.tolist(), *rest])
 
-def look(
+
+def residuals_of(
     cell_map: CellMap,
     short_term: float,
     seen: Observations,
     T_map_robot: Float,
     times: tuple[float, float],
     turn: int,
-) -> Evidence:
+) -> Residuals:
     """Compare a sample of what is ``seen`` from ``T_map_robot`` with the map, before it is written.
 
     ``times``: s since the last frame, and since all directions of position were seen; ``turn``
@@ -300,17 +277,17 @@ def look(
         config.bent,
         seen.sensor_sigma_m,
     )
-    geometry, sums, old = np.zeros((3, 3)), np.zeros(8), np.zeros(8)
+    geometry, sums, old = np.zeros(6), np.zeros(8), np.zeros(8)
     elapsed, since_s = times
     _look(
-        tuple(cell_map.cells), short_term, cell, seen.points_robot, seen.covariances, seen.weights,
-        NO_VOTES if seen.votes is None else seen.votes, seen.joined, seen.T_robot_laser,
+        tuple(cell_map.cells), short_term, cell, seen.points_robot, seen.covariances, seen.shares,
+        NO_WEIGHTS if seen.weights is None else seen.weights, seen.joined, seen.T_robot_laser,
         T_map_robot, turn % step, step, (elapsed, cell_map.pace(elapsed), since_s), pairing,
         np.empty(2), geometry, sums, old,
     )  # fmt: skip
     shared, paired, feigned, new, weighed = sums[:NEW_XX].tolist()
-    return Evidence(
-        geometry=geometry,
+    return Residuals(
+        geometry=whole(geometry),
         weighed=weighed,
         in_view=weighed * step,
         shared=shared,

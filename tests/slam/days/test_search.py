@@ -87,10 +87,10 @@ def test_a_place_that_is_found_late_is_asked_for_the_scans_before(home):
     pose, places = search._before[1], search._places
     best = max(places.followed, key=lambda one: one.nats)
     there = best.match.T_map_robot
-    late = Place(match=unmatched(there, matched=1.0, score=0.0), told=1.0)
+    late = Place(match=unmatched(there, matched=1.0, score=0.0), evidence=1.0)
     beside = np.array([1.0, 1.0, 1.0])
     match = unmatched(se2.compose(there, beside), matched=1.0, score=0.0)
-    denied = replace(late, match=match, told=-100.0)
+    denied = replace(late, match=match, evidence=-100.0)
     places.followed.clear()
     for new in (late, denied):
         search._join(new, pose)

@@ -78,14 +78,6 @@ def test_a_line_is_no_point():
     assert response[15:45, 15:45].max() < 0.01 * IDEAL
 
 
-def test_the_unit_of_response_is_a_lone_dot():
-    image, widths = np.zeros((40, 40)), np.ones((40, 40))
-    one = np.ones(1, dtype=bool)
-    draw(image, widths, np.array([[20.2, 20.1]]), np.array([1.2]), one, ~one)
-    peak = cv2.cornerMinEigenVal(image.astype(np.float32), 5, ksize=3).max()
-    assert peak == pytest.approx(IDEAL, rel=0.1)
-
-
 @pytest.mark.parametrize("n", [181, 361])
 def test_corners_of_a_room_are_found_where_they_are(n):
     """Inner corners and a pillar's outer one, over 40 noisy scans, with their covariance."""

@@ -8,7 +8,7 @@ from slam import se2
 from slam.frontend.observations import from_scan
 from slam.grid.occupancy import Grid, OccupancySlam
 from slam.tracker.cells import living
-from slam.tracker.uncertainty.residuals import look
+from slam.tracker.uncertainty.residuals import residuals_of
 from tests.world2d import World2D, arena, frames, laser, wander
 
 CELL_M = 0.05
@@ -48,8 +48,8 @@ def test_a_look_weighs_less_the_longer_a_cell_was_looked_at(driven):
     shares = []
     for factor in (0.0, 1.0, 10.0):
         system.cell_map.cells.age[:] = factor * ages
-        evidence = look(system.cell_map, 0.0, seen, pose, (0.2, 0.0), 0)
-        shares.append(evidence.new / evidence.weighed)
+        residuals = residuals_of(system.cell_map, 0.0, seen, pose, (0.2, 0.0), 0)
+        shares.append(residuals.new / residuals.weighed)
     system.cell_map.cells.age[:] = ages
     assert 1.0 >= shares[0] > shares[1] > shares[2] > 0.0
 

@@ -55,26 +55,6 @@ def test_linear_equations_are_solved(size):
     np.testing.assert_allclose(S @ x, b, atol=1e-12)
 
 
-@pytest.mark.parametrize("n", [1, 2, 7, 30])
-def test_the_update_is_josephs_form(n):
-    ekf = looked_around(n)
-    chosen = np.arange(0, n, 2)
-    z, R = seen(ekf, chosen, 0.01)
-    P, m = ekf.error_covariance.copy(), len(chosen)
-    local, _, S, _ = kernels.linearise(ekf.pose, ekf.landmarks, P, chosen, z, R)
-    index = np.concatenate([[0, 1, 2], 3 + np.stack([2 * chosen, 2 * chosen + 1], 1).ravel()])
-    H, noise = np.zeros((2 * m, len(P))), np.zeros((2 * m, 2 * m))
-    H[:, index] = local
-    for k in range(m):
-        noise[2 * k : 2 * k + 2, 2 * k : 2 * k + 2] = R[k]
-    K = P @ H.T @ np.linalg.inv(S)
-    keep = np.eye(len(P)) - K @ H
-    ekf.update(chosen, z, R)
-    expected = keep @ P @ keep.T + K @ noise @ K.T
-    np.testing.assert_allclose(ekf.error_covariance, expected, atol=1e-12 * P.max())
-    np.testing.assert_array_equal(ekf.error_covariance, ekf.error_covariance.T)
-
-
 @pytest.mark.slow
 def test_a_thousand_precise_updates_of_a_vague_state_leave_it_positive():
     """1 mm seen from a pose that was lost by 10 m, again and again."""

@@ -165,17 +165,6 @@ def test_removed_landmarks_leave_the_rest_as_it_was():
     assert len(ekf) == 3
 
 
-def test_growing_beyond_the_first_capacity_changes_nothing():
-    rng = np.random.default_rng(3)
-    points = rng.uniform(-5.0, 5.0, (100, 2))
-    R = np.tile(spread(0.01, 0.01), (100, 1, 1))
-    at_once, in_two = looked_around(), looked_around()
-    at_once.add(points, R)
-    in_two.add(points[:30], R[:30])
-    in_two.add(points[30:], R[30:])
-    np.testing.assert_array_equal(at_once.error_covariance, in_two.error_covariance)
-
-
 def test_bad_updates_are_refused():
     ekf = looked_around()
     z, R = np.zeros((2, 2)), np.tile(spread(0.1, 0.1), (2, 1, 1))

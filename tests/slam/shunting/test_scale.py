@@ -6,7 +6,7 @@ import numpy as np
 from slam import se2
 from slam.frontend.observations import from_scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
-from slam.tracker.cells import FREE_COUNT, TOUCHED_COUNT, living
+from slam.tracker.cells import FREE_COUNT, living
 from slam.tracker.network import Network
 from slam.tracker.rasterise import rasterise
 from tests.world2d import World2D, arena, frames, laser, office, office_loop, wander
@@ -21,27 +21,6 @@ def test_a_live_neuron_costs_few_bytes() -> None:
     for frame in frames(World2D(office()), office_loop(), rate_hz=1.0, spec=laser(), seed=3):
         slam.update(frame.without_truth())
     assert slam.network.bytes_per_neuron() <= 48.0
-
-
-def test_blocks_of_impressions_that_are_forgotten_die() -> None:
-    """A look from a wrong pose that is taken back leaves neither blocks nor slots behind."""
-    slam = ShuntingSlam(CONFIG)
-    for frame in STREAM[:5]:
-        slam.update(frame.without_truth())
-    network = slam.network
-    directory, unused = network.cells.directory.copy(), int(network.cells.counts[FREE_COUNT])
-    assert STREAM[0].scan is not None
-    observations = from_scan(STREAM[0].scan, np.zeros(3), CONFIG)
-    slots = len(network.cells.free)
-    for k in range(20):
-        rasterise(network, observations, np.array([30.0 + k, 0.3 * k, 0.1 * k]))
-        network.release()
-    _, places = living(network.cells)
-    assert len(places) == (directory >= 0).sum()
-    born = len(network.cells.free) - slots
-    assert int(network.cells.counts[FREE_COUNT]) == unused + born
-    assert len(np.unique(network.cells.free[: unused + born])) == unused + born
-    assert network.cells.counts[TOUCHED_COUNT] == 0
 
 
 def test_every_slot_is_either_free_or_lives_once() -> None:

@@ -26,7 +26,7 @@ def point(x: float, y: float, cell: float, view: View = BLIND) -> Observations:
     return Observations(
         points_robot=np.array([[x, y]]),
         covariances=np.array([[variance, 0.0, variance]]),
-        weights=np.ones(1),
+        shares=np.ones(1),
         tangents=np.zeros((1, 2)),
         joined=np.zeros(1, np.bool_),
         facings=np.zeros(1, np.uint8),

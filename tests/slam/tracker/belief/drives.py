@@ -33,7 +33,7 @@ def made(kind: type[Tracker]) -> Tracker:
     return kind(configs[kind])
 
 
-def told(system: Tracker, stream: Iterable[Frame]) -> list[Estimate]:
+def estimates(system: Tracker, stream: Iterable[Frame]) -> list[Estimate]:
     """What is said of each frame."""
     return [system.update(frame.without_truth()) for frame in stream]
 
@@ -63,7 +63,7 @@ def mapped(
 ) -> tuple[Tracker, Frame]:
     """A SLAM that knows its room, and the last frame."""
     system, stream = made(kind), frames(world, drive, rate_hz=5.0, seed=3)
-    assert set(states(told(system, stream))) == {"tracking"}
+    assert set(states(estimates(system, stream))) == {"tracking"}
     return system, stream[-1]
 
 

@@ -6,7 +6,7 @@ import pytest
 
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.config import BeliefConfig
-from tests.slam.tracker.belief.drives import ROOMS, START, still, told
+from tests.slam.tracker.belief.drives import ROOMS, START, estimates, still
 from tests.world2d import Drive, frames, going_on
 
 PATHS = ["map.known_s", "carried_per_h", *(f"belief.{row.path}" for row in BeliefConfig().rows())]
@@ -19,7 +19,7 @@ ABOUT = {row.path: row.about for row in CONFIG.rows()}
 @pytest.mark.parametrize("path", PATHS)
 def test_a_number_at_its_bounds_is_survived(path: str) -> None:
     for value in (ABOUT[path].low, ABOUT[path].high):
-        for one in told(ShuntingSlam(CONFIG.changed({path: value})), STREAM):
+        for one in estimates(ShuntingSlam(CONFIG.changed({path: value})), STREAM):
             assert 0.0 <= one.diagnostics["p_lost"] <= 1.0
             eigenvalues = np.linalg.eigvalsh(one.covariance)
             assert eigenvalues.min() >= -1e-9 * eigenvalues.max()

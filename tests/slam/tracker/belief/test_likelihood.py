@@ -16,27 +16,27 @@ from slam.tracker.belief.likelihood import (
     MOST_NATS,
     S_PER_H,
     carried,
+    evidence,
     probabilities,
     sum_of,
-    told,
 )
-from tests.slam.tracker.belief.drives import FAST, ROOMS, at, blind_turn, mapped, still
-from tests.slam.tracker.belief.drives import told as said
+from tests.slam.tracker.belief.drives import FAST, ROOMS, at, mapped, still
+from tests.slam.tracker.belief.drives import estimates as said
 from tests.world2d import going_on
 
 CONFIG = BeliefConfig()
 
 
 def test_a_scan_says_the_more_the_more_of_it_is_explained_and_no_more_than_its_bounds() -> None:
-    nats = np.array([told(CONFIG, share) for share in np.linspace(0.0, 1.0, 101)])
+    nats = np.array([evidence(CONFIG, share) for share in np.linspace(0.0, 1.0, 101)])
     assert (np.diff(nats) > 0.0).all()
     most = CONFIG.slope * math.log((1.0 + ENDS) / ENDS)
     assert (nats[0], nats[-1]) == pytest.approx((CONFIG.known - most, CONFIG.known + most))
-    assert (told(CONFIG, -3.0), told(CONFIG, 7.0)) == (nats[0], nats[-1])
+    assert (evidence(CONFIG, -3.0), evidence(CONFIG, 7.0)) == (nats[0], nats[-1])
     assert nats[50] == pytest.approx(CONFIG.known)
     np.testing.assert_allclose(nats + nats[::-1], 2.0 * CONFIG.known, atol=1e-9)
     nothing = replace(CONFIG, slope=0.0, known=0.0)
-    assert told(nothing, 0.0) == told(nothing, 1.0) == 0.0
+    assert evidence(nothing, 0.0) == evidence(nothing, 1.0) == 0.0
 
 
 @pytest.mark.parametrize("shares", [[0.3], [0.9, 0.2, 0.7], [0.5] * 20])
@@ -45,7 +45,7 @@ def test_scans_multiply_the_odds(shares: list[float]) -> None:
     odds = 0.01
     for s in shares:
         odds *= ((s + ENDS) / (1.0 - s + ENDS)) ** CONFIG.slope * math.exp(CONFIG.known)
-    p, _ = probabilities([math.log(0.01) + sum(told(CONFIG, s) for s in shares), 0.0])
+    p, _ = probabilities([math.log(0.01) + sum(evidence(CONFIG, s) for s in shares), 0.0])
     assert p == pytest.approx(odds / (1.0 + odds))
 
 
@@ -64,27 +64,21 @@ def test_the_prior_adds_up_over_a_gap_however_often_it_is_asked(steps: int) -> N
     assert nats == pytest.approx(math.log(2.0 * 100.0 / S_PER_H))
 
 
-def test_who_was_blind_for_long_may_have_been_carried_all_that_while() -> None:
-    system, last = mapped(ROOMS)
-    before = system._belief._unknown
-    said(system, blind_turn(last, steps=50, said_rad=0.0, sd_rad=0.01))
-    expected = sum_of([before, carried(FAST.carried_per_h, 10.0)])
-    assert system._belief._unknown == pytest.approx(expected)
-
-
 def test_what_scans_say_of_the_motion_is_bounded_either_way(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     """Who went on for hours is lost by one kidnap; who was lost for hours is believed in time."""
     system, last = mapped(ROOMS)
     for nats, bound in ((1e3, -MOST_NATS), (-1e3, MOST_LOST)):
-        monkeypatch.setattr(Belief, "_going_on", lambda *_, told=nats: (told >= 0.0, told))
+        monkeypatch.setattr(
+            Belief, "_going_on", lambda *_, evidence=nats: (evidence >= 0.0, evidence)
+        )
         stream = going_on(still(ROOMS, at(system), 0.8), last)
         said(system, stream)
         last = stream[-1]
         assert system._belief._unknown == pytest.approx(bound, abs=1e-6)
     monkeypatch.undo()
-    assert 8.0 * told(CONFIG, 1.0) > MOST_LOST
+    assert 8.0 * evidence(CONFIG, 1.0) > MOST_LOST
 
 
 def test_too_little_in_view_says_nothing() -> None:
@@ -99,9 +93,9 @@ def test_too_little_in_view_says_nothing() -> None:
     belief._match = matched
     said(system, going_on(still(ROOMS, at(system), 0.2), last)[:1])
     match = matched(seen[0], system._predict(last.odometry), system.cell_map)
-    few = FAST.tracking.relocalise.least_weight / seen[0].weight
+    few = FAST.tracking.relocalise.least_weight / seen[0].amount
     for share, silent in ((0.99 * few, True), (1.01 * few, False)):
-        less = replace(seen[0], weights=share * seen[0].weights)
+        less = replace(seen[0], shares=share * seen[0].shares)
         goes_on, nats = belief._going_on(None, less, match, 1.0)
         assert (goes_on, nats == 0.0) == (True, silent)
 

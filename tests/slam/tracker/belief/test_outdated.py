@@ -14,12 +14,12 @@ from tests.slam.tracker.belief.drives import (
     SLAMS,
     TURN,
     at,
+    estimates,
     made,
     mapped,
     off_m,
     states,
     still,
-    told,
 )
 from tests.world2d import Drive, Wheels, World2D, arena, frames, going_on, rectangle
 
@@ -53,7 +53,7 @@ def test_where_all_but_the_walls_moved_nobody_is_lost_and_the_new_room_is_the_ma
     turning = Drive(at(system), ((0.0, 0.4, 16.0),))
     after = frames(furnished(0.6), turning, rate_hz=5.0, seed=3)
     stream = going_on(after, last, seconds=10.0)  # boxes do not jump between two scans
-    said = told(system, stream)
+    said = estimates(system, stream)
     assert "lost" not in states(said)
     assert max(one.diagnostics["p_lost"] for one in said) < 0.5
     assert max(off_m(one, f.truth) for one, f in zip(said, stream, strict=True)) < 0.05
@@ -68,7 +68,7 @@ def test_a_few_things_that_all_moved_do_not_make_a_robot_lost() -> None:
     """They may have moved as well as the robot: that is no evidence against the odometry."""
     system, last = mapped(posts())
     pose = at(system)
-    said = told(system, going_on(still(posts(0.5, -0.4), pose, 6.0), last))
+    said = estimates(system, going_on(still(posts(0.5, -0.4), pose, 6.0), last))
     assert max(one.diagnostics["p_lost"] for one in said) < 0.5
     assert said[-1].converged
     assert max(off_m(one, pose) for one in said) < 0.1
@@ -86,7 +86,7 @@ def test_boards_that_close_in_do_not_lose_the_robot(kind: type[Tracker]) -> None
         turn = Drive(start, ((0.0, 0.5, 12.0 if count == 4 else 1.0),))
         more = frames(World2D(walls), turn, rate_hz=5.0, seed=count, wheels=POOR)
         stream += going_on(more, stream[-1])
-    said = told(made(kind), stream)
+    said = estimates(made(kind), stream)
     assert max(off_m(one, frame.truth) for one, frame in zip(said, stream, strict=True)) < 0.08
     assert states(said)[-1] == "tracking"
 
@@ -101,7 +101,7 @@ def test_boards_that_hide_everything_and_go_again_change_nothing(kind: type[Trac
         world = World2D(np.vstack([arena(), np.reshape(BOARDS[:count], (-1, 4))]))
         before = stream[-1] if stream else last
         stream += going_on(still(world, pose, 1.4), before)
-    said = told(system, stream)
+    said = estimates(system, stream)
     assert max(off_m(one, pose) for one in said) < 0.03
     assert "relocated" not in states(said)
     assert max(one.diagnostics["p_lost"] for one in said) < 0.5

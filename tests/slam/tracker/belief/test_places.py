@@ -11,14 +11,14 @@ import pytest
 from slam import se2
 from slam.frontend.observations import Observations
 from slam.frontend.odometry_prior import Prediction, turned
-from slam.tracker.belief.likelihood import probabilities, told
+from slam.tracker.belief.likelihood import evidence, probabilities
 from slam.tracker.belief.places import ANEW, MOST_ANEW, Place, Places, is_same, novelty
 from slam.tracker.cell_map import CellMap
 from slam.tracker.matching.budget import Budget
 from slam.tracker.matching.matcher import Matcher, unmatched
 from slam.tracker.network import Network
 from tests.slam.tracker.belief.drives import LONG_TURN, ROOMS, mapped, still
-from tests.slam.tracker.belief.drives import told as said
+from tests.slam.tracker.belief.drives import estimates as said
 from tests.slam.tracker.belief.rooms import CONFIGS, ORIGIN, known, seen
 from tests.world2d import World2D, arena, going_on
 
@@ -74,32 +74,35 @@ def test_a_scan_weighs_by_its_novelty_and_says_less_for_what_is_found(room: Cell
             places.followed = [replace(places.followed[0], match=back)]
             places.follow(view, replace(by([step, 0.0, 0.0]), elapsed=0.01), budget(1.0))
         sums.append(places.followed[0].nats)
-        of_one = places.told(places.followed[0].match)
+        of_one = places.evidence(places.followed[0].match)
         assert sums[-1] == pytest.approx(0.6 / ANEW[0] * of_one, rel=0.05)
     assert sums[0] == pytest.approx(sums[1], rel=0.02)
     share = places.followed[0].match.overlapped / places._matcher.usual.match
-    assert of_one == pytest.approx(told(CONFIG.belief, share) - CONFIG.belief.new)
-    assert of_one > 0.0 > places.told(unmatched(ORIGIN, matched=0.0, score=0.0))
+    assert of_one == pytest.approx(evidence(CONFIG.belief, share) - CONFIG.belief.new)
+    assert of_one > 0.0 > places.evidence(unmatched(ORIGIN, matched=0.0, score=0.0))
 
 
 def test_a_place_s_evidence_is_bounded_and_lags_behind_the_prior(room: CellMap) -> None:
     """Of many new scans the mean says as much as a few; further ones see the same again."""
     for anew in (0.5, MOST_ANEW, 4.0 * MOST_ANEW):
         for each in (-2.0, 5.0):
-            nats = place(0.0, 0.0, told=anew * each, anew=anew).nats
+            nats = place(0.0, 0.0, evidence=anew * each, anew=anew).nats
             assert nats == pytest.approx(min(anew, MOST_ANEW) * each)
     places = Places(room, Matcher(CONFIG))
-    places.followed = [place(0.0, 0.0, told=10.0 * MOST_ANEW, anew=2.0 * MOST_ANEW, lag=0.5)]
+    places.followed = [place(0.0, 0.0, evidence=10.0 * MOST_ANEW, anew=2.0 * MOST_ANEW, lag=0.5)]
     places.lag(1.5)
     assert places.followed[0].nats == pytest.approx(5.0 * MOST_ANEW - 2.0)
 
 
 def test_places_that_are_one_are_followed_once_and_hopeless_ones_not(room: CellMap) -> None:
     places, near = Places(room, Matcher(CONFIG)), 0.5 * NUMBERS.same_m
-    beside, best = place(0.0, 0.0, scans=9, told=0.0), place(near, 0.0, scans=5, told=8.0)
-    again = place(near + 0.01, 0.0, told=9.0)  # the same pose, found anew
-    aside, far = place(0.0, 0.0, 2.0 * NUMBERS.same_rad, told=2.0), place(3.0, 0.0, told=5.0)
-    hopeless = place(-3.0, 0.0, told=7.9 - CONFIG.belief.hopeless)
+    beside, best = place(0.0, 0.0, scans=9, evidence=0.0), place(near, 0.0, scans=5, evidence=8.0)
+    again = place(near + 0.01, 0.0, evidence=9.0)  # the same pose, found anew
+    aside, far = (
+        place(0.0, 0.0, 2.0 * NUMBERS.same_rad, evidence=2.0),
+        place(3.0, 0.0, evidence=5.0),
+    )
+    hopeless = place(-3.0, 0.0, evidence=7.9 - CONFIG.belief.hopeless)
     assert is_same(best.match, again.match)
     assert not is_same(best.match, beside.match)
     places.followed = [best]
@@ -107,7 +110,7 @@ def test_places_that_are_one_are_followed_once_and_hopeless_ones_not(room: CellM
     assert [id(one) for one in places.followed] == [id(best), id(far), id(aside)]
     places.keep([])
     assert len(places.followed) == 3
-    many = [place(float(k), 0.0, told=float(k)) for k in range(2 * NUMBERS.most)]
+    many = [place(float(k), 0.0, evidence=float(k)) for k in range(2 * NUMBERS.most)]
     places.followed = []
     places.keep(many)
     assert places.followed == many[: -NUMBERS.most - 1 : -1]
@@ -139,7 +142,7 @@ def test_who_waits_is_carried_on_by_odometry_which_may_be_off(room: CellMap) -> 
     """Against sampling; the map's axes are turned by 2 rad against where it is believed to be."""
     places, rng = Places(room, Matcher(CONFIG)), np.random.default_rng(5)
     step, sigma, n = np.array([0.1, 0.0, 0.06]), np.array([0.03, 0.01, 0.02]), 4000
-    places.followed = [place(1.0, 2.0, 3.0, told=3.0)]
+    places.followed = [place(1.0, 2.0, 3.0, evidence=3.0)]
     drawn, believed = np.tile(places.followed[0].match.T_map_robot, (n, 1)), np.zeros(3)
     believed[2] = 1.0
     for _ in range(10):
@@ -196,7 +199,7 @@ def test_the_covariance_is_that_of_the_mixture(monkeypatch: pytest.MonkeyPatch) 
     belief, rng, here = system._belief, np.random.default_rng(2), np.array([1.0, -2.0, 3.0])
     assert belief._doubt is not None
     poses = [np.array([4.0, 1.0, -3.1]), np.array([-2.0, 0.5, 1.0])]
-    belief._doubt.places.followed = [place(*poses[0], told=0.5), place(*poses[1], told=1.5)]
+    belief._doubt.places.followed = [place(*poses[0], evidence=0.5), place(*poses[1], evidence=1.5)]
     monkeypatch.setattr(belief, "_unknown", 1.0)
     best = CONFIG.belief.best  # of all found in the whole map
     shares = probabilities([0.0, 1.0, 1.5 - best, 2.5 - best])

@@ -73,14 +73,6 @@ def test_a_second_is_forgotten_alike_at_any_rate(fast_s: float) -> None:
     assert 0.5 < shares[0] < 1.0
 
 
-def test_one_scan_alone_never_makes_the_usual() -> None:
-    """After a gap of a minute too: a board in that scan must not be what goes on."""
-    usual = settled(match(overlapped=0.8))
-    usual.follow(match(overlapped=0.1), ALL, 60.0)
-    assert usual.share(match(overlapped=0.8), ALL) < 1.5
-    assert usual.share(match(overlapped=0.1), ALL) < 0.3
-
-
 def test_what_was_not_in_view_before_need_not_go_on() -> None:
     """A robot that turns into a part of a room that no scan has seen has not been carried off."""
     usual = settled(match(overlapped=0.8))
@@ -88,11 +80,6 @@ def test_what_was_not_in_view_before_need_not_go_on() -> None:
     assert usual.share(turned, ALL) < 0.3
     assert usual.share(turned, seeing(0.25)) == pytest.approx(1.0, abs=1e-3)
     assert usual.share(match(overlapped=0.9), seeing(0.5)) < 1.3
-
-
-def test_nothing_before_is_no_division_by_nothing() -> None:
-    assert np.isfinite(Usual(CONFIG).share(match(), ALL))
-    assert Usual(CONFIG).share(match(overlapped=0.0), ALL) == 0.0
 
 
 def test_the_first_scan_in_a_loaded_map_is_to_go_on_from_it() -> None:

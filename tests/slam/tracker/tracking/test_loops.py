@@ -16,10 +16,7 @@ from slam.posegraph import Edge
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.matching.matcher import Matcher
 from slam.tracker.network import Network
-from slam.tracker.tracking import closures
-from slam.tracker.tracking.keys import KeyFrames
 from slam.tracker.tracking.loops import Loops
-from slam.tracker.tracking.redraw import Redrawing
 from tests.world2d import Drive, World2D, frames, laser, office, office_loop, rectangle
 
 pytestmark = pytest.mark.slow
@@ -97,19 +94,6 @@ def test_a_map_that_moved_off_its_start_says_so(drifted: Drifted) -> None:
     assert known @ np.linalg.solve(error, known) <= 1.0
     off = last - truth[-1]
     assert off @ np.linalg.solve(error, off) < 11.3  # 3 numbers, 99 %
-
-
-def test_the_graph_does_not_depend_on_how_many_submaps_are_kept(
-    drifted: Drifted, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    found = []
-    for kept in (closures.KEPT, 1):
-        monkeypatch.setattr(closures, "KEPT", kept)
-        graph = filled(Loops(CONFIG, Matcher(CONFIG), lambda: Network(CONFIG)), drifted)
-        finish(graph)
-        assert len(graph.closures._submaps) <= kept
-        found.append(graph.corrected(drifted[2]))
-    np.testing.assert_array_equal(*found)
 
 
 def test_a_copy_amid_a_search_comes_to_the_same_graph(drifted: Drifted) -> None:
@@ -261,25 +245,6 @@ def test_a_ring_of_335_m_closes_while_driving() -> None:
     after = errors(final, truth)
     assert after[-1] <= 0.10
     assert after.max() < 0.6 * error.max()
-
-
-def test_a_key_frame_that_sees_far_costs_more_to_draw() -> None:
-    costs = []
-    for side_m in (4.0, 20.0):
-        stream = frames(
-            World2D(rectangle(-side_m / 2, -side_m / 2, side_m / 2, side_m / 2)),
-            Drive((0.0, 0.0, 0.0), ((0.0, 0.0, 1.0),)),
-            rate_hz=1.0,
-            spec=laser(181, range_max=30.0),
-            seed=0,
-        )
-        keys = KeyFrames(CONFIG.loops)
-        keys.add(np.zeros(3), np.zeros(3), np.eye(3), seen(next(iter(stream))))
-        costs.append(
-            Redrawing(CONFIG.map, lambda: Network(CONFIG), keys.keys, [np.zeros(3)]).draw()
-        )
-    # mean square of the range, in a square: side^2 / pi, 5 and 127 m^2
-    assert costs == [1, 7]
 
 
 def test_places_found_while_lost_do_not_tear_the_map_alone(drifted: Drifted) -> None:

@@ -77,14 +77,6 @@ def test_the_graph_that_is_left_holds_together_where_it_was() -> None:
         assert np.linalg.eigvalsh(INFORMATION)[0] > np.linalg.eigvalsh(edge.information)[0]
 
 
-def test_numbers_of_pairs_and_rows() -> None:
-    merge = Merge(np.array([0, 1, 1, 3, 0]))
-    assert [merge.number(k) for k in range(7)] == [0, 1, None, 2, None, 3, 4]
-    assert merge.pair((3, 6)) == (2, 4)
-    assert merge.pair((2, 3)) is None
-    assert merge.rows("abcdefg") == ["a", "b", "d", "f", "g"]
-
-
 def test_a_map_that_is_not_moved_keeps_all_key_frames(monkeypatch: pytest.MonkeyPatch) -> None:
     """Else past poses would lose the corrections that only their own key frames have."""
     monkeypatch.setattr(loops, "MOST_KEYS", 10)

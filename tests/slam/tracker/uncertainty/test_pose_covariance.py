@@ -21,7 +21,7 @@ from slam.tracker.standing.agreement import Agreement
 from slam.tracker.uncertainty.covariances import observable
 from slam.tracker.uncertainty.odometry_noise import OdometryNoise, innovation
 from slam.tracker.uncertainty.pose_covariance import PoseCovariance
-from slam.tracker.uncertainty.residuals import Evidence, look
+from slam.tracker.uncertainty.residuals import Residuals, residuals_of
 from tests.world2d import Drive, World2D, arena, frames, laser, rectangle, wander
 
 CONFIG = ShuntingConfig.robust(cell_m=0.05)
@@ -44,11 +44,11 @@ def matched(information: Float, T: Float = ZERO) -> Match:
     return Match(T_map_robot=T, information=information, matched=share, score=0.0, tau=share)
 
 
-def seen(geometry: Float, weighed: float = 20.0, **more: Any) -> Evidence:
+def seen(geometry: Float, weighed: float = 20.0, **more: Any) -> Residuals:
     """Surfaces of that geometry a beam, seen long and with errors of their own."""
     rest: dict[str, Any] = {"in_view": 75.0, "shared": 0.0, "feigned": 0.0, "new": 0.0} | more
     rest = {"paired": weighed, "new_geometry": ZERO, "old": np.zeros(6), "old_off_m2": 0.0} | rest
-    return Evidence(geometry=weighed * geometry, weighed=weighed, **rest)
+    return Residuals(geometry=weighed * geometry, weighed=weighed, **rest)
 
 
 def driven(stream: list[Frame]) -> list[Estimate]:
@@ -148,17 +148,17 @@ def test_surface_is_old_by_how_long_it_was_looked_at() -> None:
         assert frame.scan is not None
         view = from_scan(frame.scan, np.zeros(3), CONFIG)
         if k in (5, 40, 320):
-            evidence = look(network, 0.3, view, np.zeros(3), (0.2, 0.0), 0)
-            whole = evidence.geometry * (evidence.in_view / evidence.weighed)
-            shares.append(evidence.old[[0, 3, 5]] / np.diag(whole))
+            residuals = residuals_of(network, 0.3, view, np.zeros(3), (0.2, 0.0), 0)
+            whole = residuals.geometry * (residuals.in_view / residuals.weighed)
+            shares.append(residuals.old[[0, 3, 5]] / np.diag(whole))
         rasterise(network, view, np.zeros(3))
         network.integrate(view.view, view.T_robot_laser, 0.2, write=True)
     new, half, old = (float(np.mean(share)) for share in shares)
     assert new < 0.03
     assert 0.3 < half < 0.55
     assert old > 0.8
-    elsewhere = look(network, 0.3, view, np.array([0.8, 0.5, 0.4]), (0.2, 0.0), 0)
-    assert elsewhere.old[0] < 0.2 * evidence.old[0]
+    elsewhere = residuals_of(network, 0.3, view, np.array([0.8, 0.5, 0.4]), (0.2, 0.0), 0)
+    assert elsewhere.old[0] < 0.2 * residuals.old[0]
 
 
 def test_residuals_of_noise_are_not_shared_and_a_moved_wall_is() -> None:
@@ -170,8 +170,8 @@ def test_residuals_of_noise_are_not_shared_and_a_moved_wall_is() -> None:
             ranges = scan.ranges + np.float32(longer)
             longer_scan = Scan(stamp_ns=scan.stamp_ns, ranges=ranges, spec=scan.spec)
             view = from_scan(longer_scan, np.zeros(3), CONFIG)
-            evidence = look(network, 0.3, view, np.zeros(3), (0.2, 0.0), turn)
-            shared, paired = shared + evidence.shared, paired + evidence.paired
+            residuals = residuals_of(network, 0.3, view, np.zeros(3), (0.2, 0.0), turn)
+            shared, paired = shared + residuals.shared, paired + residuals.paired
         totals[name] = shared / paired
     assert abs(totals["noise"]) < 0.003**2
     assert 0.008**2 < totals["moved"] < 0.021**2  # the part of 2 cm along the walls' normals
@@ -270,23 +270,6 @@ def test_a_slip_of_two_scans_goes_on_for_some_tenths_of_a_second() -> None:
     assert told(2, 0.5) == told(0, 0.5)
 
 
-def test_a_robot_that_is_turned_by_hand_is_expected_to_be_turned_on() -> None:
-    """Odometry stands, while the robot turns by 1 rad/s for five scans, and then stands, too."""
-    drive = Drive((0.0, 0.0, 0.0), ((0.0, 0.0, 1.0), (0.0, 1.0, 0.14), (0.0, 0.0, 1.0)))
-    stream = frames(World2D(arena()), drive, rate_hz=37.5, seed=3)
-    system, expected_rad = ShuntingSlam(CONFIG), []
-    for frame in stream:
-        odometry = Odometry(
-            stamp_ns=frame.stamp_ns, T_odom_robot=ZERO, increment_covariance=1e-6 * np.eye(3)
-        )
-        system.update(dataclasses.replace(frame, odometry=odometry).without_truth())
-        expected_rad.append(math.sqrt(float(system._odometry_noise._slip[2, 2])))
-    first = next(k for k, f in enumerate(stream) if abs(float(f.truth[2])) > 0.02)
-    assert max(expected_rad[:first]) == 0.0
-    assert max(expected_rad[first : first + 5]) > 0.015
-    assert expected_rad[-1] < 0.002
-
-
 def test_nees_is_right_when_the_errors_are_what_the_belief_was_told() -> None:
     """A toy: odometry with known Gaussian odometry_noise and nothing seen. NEES / 3 is 1."""
     rng = np.random.default_rng(7)
@@ -321,12 +304,12 @@ def standing(shared_m: float, in_view: float) -> tuple[Float, Float]:
     """Covariances of a robot that stands and sees the same surfaces, after 300 and 600 scans."""
     geometry = np.diag([0.5, 0.5, 4.0])
     pose_covariance = PoseCovariance(ShuntingConfig())
-    evidence = seen(geometry, in_view=in_view, shared=20.0 * shared_m**2)
+    residuals = seen(geometry, in_view=in_view, shared=20.0 * shared_m**2)
     still, match = moved(0.002, 0.002, 0.001), matched(1e5 * geometry)
     out = []
     for _ in range(2):
         for _ in range(300):
-            pose_covariance.update(ZERO, still, match, evidence)
+            pose_covariance.update(ZERO, still, match, residuals)
         out.append(pose_covariance.covariance.copy())
     return out[0], out[1]
 
@@ -358,8 +341,8 @@ def test_what_is_written_blindly_keeps_odometrys_error() -> None:
             pose_covariance.update(ZERO, drive, matched(np.zeros((3, 3))), None)
         blind = pose_covariance.covariance[0, 0]
         fresh = 20.0 * new * np.array([0.5, 0.0, 0.5])
-        evidence = seen(geometry, new=20.0 * new, new_geometry=fresh)
-        pose_covariance.update(ZERO, drive, matched(1e5 * geometry), evidence)
+        residuals = seen(geometry, new=20.0 * new, new_geometry=fresh)
+        pose_covariance.update(ZERO, drive, matched(1e5 * geometry), residuals)
         left[new] = pose_covariance.covariance[0, 0] / blind
         assert np.linalg.eigvalsh(pose_covariance.covariance)[0] > 0.0
     assert left[0.0] < 0.05
