@@ -103,7 +103,8 @@ def _files(path: Path) -> list[tuple[str, Path]]:
 def try_names(slams: Iterable[str], scenes: Iterable[str]) -> None:
     """Make each once: wrong names are told before anything starts."""
     for name in scenes:
-        registry.build(name)
+        if name not in registry.OWN:
+            registry.build(name)
     for name in slams:
         limited(name, Limits())
 

@@ -22,7 +22,7 @@ from slam.system import config_of
 RECIPE = "recipe.json"
 # What comparisons, drives and benchmarks consist of: all else in their folders is somebody else's.
 GROWING = (
-    "*.npz", "*.npz.sha256", "*.csv", "*.png", "runs.json", RECIPE, "report.html", "index.html",
+    "*.npz", "*.npz.sha256", "*.csv", "*.png", RECIPE, "report.html", "index.html",
     "leaderboard.json", "leaderboard.md", "submission_*.json", "days.json",
     "*lives/*.json", "*lives/*.json.sha256",
 )  # fmt: skip

@@ -22,7 +22,7 @@ from slam.errors import LogFormatError, MissingPathError
 from slam.maps import has_sums, read_map
 from slam.tracker import map_file as memory
 
-_TABLES = ("runs.csv", "runs.json", "levels.csv")
+_TABLES = ("runs.csv", "levels.csv")
 # What a verb always leaves, by the command in the recipe: a lost line is no way out.
 _ALWAYS = {
     "run": ("results.json", "trajectories.png", "trajectory_odometry.tum"),

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Closed-loop drives as a whole: drive, write tables and pictures; what is there already stays."""
+"""Closed-loop drives as a study (``scripts.engine``): their tables and pictures."""
 
-import json
 from collections.abc import Sequence
 from dataclasses import asdict
 from pathlib import Path
@@ -16,23 +15,20 @@ from rich.table import Table
 import scenes
 from scenes import registry
 from scenes.scene import Scene
-from scripts import figures
+from scripts import engine, figures
 from scripts.closed_loop import tables
-from scripts.closed_loop.plan import RUNS, SCHEMA, Plan
+from scripts.closed_loop.plan import RUNS, SCHEMA, DrivePlan
 from scripts.closed_loop.runs import DrivenRun, load
 from scripts.closed_loop.tables import LEVELS, TABLE
 from scripts.comparison.tables import Row, write_checked, write_csv
 from scripts.console import level_table
+from scripts.engine import Files, Stage, Study
 from scripts.figures import COLORS, color_of, save, styled
-from scripts.jobs import run_jobs, try_names
-from scripts.machine import machine
-from scripts.output import result_folder
 from sim.view.draw import Picture
 from sim.view.mapview import MapView
 from sim.world.world import World
 from slam.errors import UnknownNameError
 from slam.evaluation.lost import FOUND_RULE, LOST_RULE
-from slam.files import write_text
 from slam.frames import Float
 
 PX_PER_M = 40
@@ -40,40 +36,48 @@ PALE = 0.35  # of the colour of what can move
 MARKS = {"reached": "#168c5a", "wrong": "#ce2c3c", "given up": "#8a8f98", "failed": "#20242c"}
 
 
-def carry_out(plan: Plan, out: Path, *, jobs: int = 1) -> list[Row]:
+def carry_out(plan: DrivePlan, out: Path, *, jobs: int = 1) -> list[Row]:
     """Drive what is missing, write tables and pictures; the rows of ``levels.csv``."""
-    built = registry.build(plan.scene)  # wrong names are told before anything starts
-    for name in plan.goals if isinstance(plan.goals, tuple) else ():
-        if name not in built.goals:
-            known = ", ".join(sorted(built.goals))
-            raise UnknownNameError(f"scene '{plan.scene}' has no goal '{name}'. Known: {known}.")
-    try_names(plan.slams, ())
-    out = out.absolute()
-    settings = {
-        "drive_schema": SCHEMA, **asdict(plan), "lost_rule": LOST_RULE, "found_rule": FOUND_RULE,
-        "machine": machine(),
-    }  # fmt: skip
-    with result_folder(out, "drive", settings) as written:
-        wanted = list(plan.jobs())
-        files = run_jobs([j for _, j in wanted], out / RUNS, processes=jobs, title="driving")
-        runs = [load(files[job.name], identity) for identity, job in wanted]
-        with written() as staged:
-            return _write(staged, plan, runs)
+    check_goals(plan)
+    return engine.carry_out(study(plan), out, jobs=jobs)
 
 
-def _write(out: Path, plan: Plan, runs: list[DrivenRun]) -> list[Row]:
+def check_goals(plan: DrivePlan) -> None:
+    """``UnknownNameError`` for a goal that the scene has not."""
+    names = plan.goals if isinstance(plan.goals, tuple) else ()
+    known = registry.build(plan.scene).goals if names else ()
+    for name in names:
+        if name not in known:
+            raise UnknownNameError(
+                f"scene '{plan.scene}' has no goal '{name}'. Known: {', '.join(sorted(known))}."
+            )
+
+
+def study(plan: DrivePlan) -> Study[list[Row]]:
+    """All of a drive."""
+    wanted = list(plan.jobs())
+
+    def write(folder: Path, done: Files) -> list[Row]:
+        return _write(folder, plan, [load(done[job.name], who) for who, job in wanted])
+
+    rules = {"lost_rule": LOST_RULE, "found_rule": FOUND_RULE}
+    return Study(
+        command="drive",
+        settings={"drive_schema": SCHEMA, **asdict(plan), **rules},
+        slams=plan.slams,
+        scenes=(plan.scene,),
+        stages=[Stage(title="driving", folder=RUNS, jobs=[job for _, job in wanted])],
+        write=write,
+    )
+
+
+def _write(out: Path, plan: DrivePlan, runs: list[DrivenRun]) -> list[Row]:
     goals = [row for run in runs for row in tables.goal_rows(run)]
     rows = [tables.run_row(run) for run in runs]
     summary = tables.levels(goals, rows)
     write_csv(out / "goals.csv", goals, tables.GOAL_COLUMNS, plan.axis)
     write_csv(out / "runs.csv", rows, tables.RUN_COLUMNS, plan.axis)
     write_checked(out / LEVELS, summary, TABLE, plan.axis)
-    whole = [
-        {plan.axis if k == "dynamism" else k: v for k, v in row.items()} | {"results": run.goals}
-        for row, run in zip(rows, runs, strict=True)
-    ]
-    text = json.dumps({"schema": SCHEMA, "runs": whole}, indent=1, allow_nan=False)
-    write_text(out / "runs.json", text + "\n")
     curves(out / "closed_loop.png", summary, plan.axis)
     shown = dict.fromkeys((plan.levels[0], plan.levels[-1]))
     picked = [
@@ -84,7 +88,7 @@ def _write(out: Path, plan: Plan, runs: list[DrivenRun]) -> list[Row]:
     return summary
 
 
-def said(plan: Plan, rows: list[Row]) -> list[str]:
+def said(plan: DrivePlan, rows: list[Row]) -> list[str]:
     """Goals reached by each SLAM at the lowest and the highest level."""
     lines = []
     for level in dict.fromkeys((plan.levels[0], plan.levels[-1])):
@@ -94,7 +98,7 @@ def said(plan: Plan, rows: list[Row]) -> list[str]:
     return lines
 
 
-def success_table(plan: Plan, rows: list[Row]) -> Table:
+def success_table(plan: DrivePlan, rows: list[Row]) -> Table:
     """Success and precision, to be printed."""
     at = {(row["dynamism"], row["slam"]): row for row in rows}
     title = f"{plan.scene}: goals reached, %; median precision, cm; runs lost"

@@ -24,7 +24,7 @@ IDENTITY = ("scene", "dynamism", "seed", "slam")
 
 
 @dataclass(frozen=True, kw_only=True)
-class Plan(Asked):
+class DrivePlan(Asked):
     """Every SLAM in the same worlds: at every level, with every seed.
 
     goals    names, or how many of the seed's order; () is all

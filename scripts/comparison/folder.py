@@ -9,7 +9,6 @@ run.believed("shunting").poses, run.truth, run.static_map
 What they must hold is said in ``schema``.
 """
 
-import json
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
@@ -38,22 +37,12 @@ from scripts.names import RUNS as RUN_FILES
 from scripts.options import AXES
 from scripts.output import RECIPE as RECIPE_FILE
 from scripts.output import check_whole, read_recipe_words
-from scripts.result_files import finite
 from slam.errors import LogFormatError
-from slam.files import write_text
 
 
 def write_table(path: Path, rows: Sequence[Mapping[str, Any]], axis: str = AXES[0]) -> None:
     """A table of a comparison, by its name; ``InvalidValueError`` for rows that it cannot have."""
     write_checked(path, rows, TABLES[path.name], axis)
-
-
-def write_json(path: Path, rows: Sequence[Mapping[str, Any]], axis: str = AXES[0]) -> None:
-    """``{"schema": 1, "runs": [...]}``; null where a cell is empty. ``axis``: as ``write_csv``."""
-    names = {name: axis if name == "dynamism" else name for name in TABLES[RUNS].columns}
-    plain = [{names[name]: finite(row.get(name)) for name in names} for row in rows]
-    text = json.dumps({"schema": SCHEMA, "runs": plain}, indent=1, allow_nan=False)
-    write_text(path, text + "\n")
 
 
 @dataclass(frozen=True, eq=False)

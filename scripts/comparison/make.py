@@ -1,25 +1,25 @@
 # SPDX-License-Identifier: Apache-2.0
-"""A comparison as a whole: simulate, run the SLAMs, write tables; what is there stays."""
+"""A comparison as a study (``scripts.engine``), and its tables."""
 
 import math
 from collections.abc import Callable, Mapping, Sequence
-from dataclasses import asdict
+from dataclasses import asdict, dataclass
 from pathlib import Path
 from typing import Any
 
 from rich.table import Table
 
+from scripts import engine
 from scripts.comparison import folder as files
 from scripts.comparison import tables
-from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
+from scripts.comparison.plan import Plan
 from scripts.comparison.recording import load
 from scripts.comparison.run_file import merge
-from scripts.comparison.schema import LEVELS, PAIRED, RUNS, RUNS_JSON, SCHEMA
+from scripts.comparison.schema import LEVELS, PAIRED, RUNS, SCHEMA
+from scripts.comparison.tables import Row
 from scripts.console import level_table
-from scripts.jobs import Job, run_jobs, try_names
-from scripts.machine import machine
+from scripts.engine import Files, Stage, Study
 from scripts.metrics.table import DRIVES
-from scripts.output import result_folder
 from slam.errors import InvalidValueError
 from slam.evaluation.lost import LOST_RULE
 from slam.frames import BeamClass
@@ -28,44 +28,55 @@ Tables = Mapping[str, Sequence[Mapping[str, Any]]]
 """By the name of a file its rows."""
 
 
-def carry_out(
-    plan: Plan,
-    out: Path,
-    *,
-    jobs: int = 1,
-    cluster: str | None = None,
-    more: Callable[..., Tables] | None = None,
-) -> list[dict[str, Any]]:
+@dataclass(frozen=True, kw_only=True)
+class Beside:
+    """What else is made in the folder of a comparison, and the tables of it."""
+
+    stages: Sequence[Stage]
+    tables: Callable[[Files], Tables]
+
+
+def carry_out(plan: Plan, out: Path, *, more: Beside | None = None, **ways: Any) -> list[Row]:
     """Make what is missing and write the tables; the rows of ``runs.csv``.
 
-    more  called as ``more(out, jobs=jobs, cluster=cluster)`` after the runs: what else is to be
-          made in ``out``, and the tables of it (``scripts.days.buildings.beside``)
+    more  what is made after the runs (``scripts.days.buildings.beside``)
+    ways  ``jobs`` and ``cluster``, as ``scripts.engine.carry_out`` has them
     """
-    try_names(plan.slams, plan.scenes)
+    return engine.carry_out(study(plan, more), out, **ways)
+
+
+def study(plan: Plan, more: Beside | None = None) -> Study[list[Row]]:
+    """All of a comparison; ``InvalidValueError`` for buildings over sessions without ``more``."""
     if plan.sessions is not None and more is None:
         raise InvalidValueError("Plan.sessions needs more=scripts.days.buildings.beside(plan)")
-    out = out.absolute()
-    settings = {"compare_schema": SCHEMA, **plan.settings(), "lost_rule": LOST_RULE}
-    settings["machine"] = machine()
-    with result_folder(out, "compare", settings) as written:
-        simulations, entries = plan.recordings(), list(plan.entries())
-        ways: dict[str, Any] = {"processes": jobs, "cluster": cluster}
-        recordings = run_jobs(simulations.values(), out / RECORDINGS, title="simulating", **ways)
-        only: list[Job] = [job for _, _, job in entries]
-        done = run_jobs(only, out / ENTRIES, title="running SLAMs", **ways)
-        added = {} if more is None else more(out, jobs=jobs, cluster=cluster)
-        with written() as staged:
-            rows: list[dict[str, Any]] = []
-            for run in plan.runs():
-                own = {name: done[job.name] for its, name, job in entries if its == run}
-                merged = merge(staged / "runs" / f"{run.name}.npz", recordings[run.name], own)
-                about = {k: v for k, v in asdict(run).items() if k != "axis"}
-                about |= _about(recordings[run.name])
-                rows += [about | row for row in merged]
-            files.write_json(staged / RUNS_JSON, rows, plan.axis)
-            own_tables = {RUNS: rows, LEVELS: tables.levels(rows), PAIRED: tables.pairs(rows)}
-            for name, table in {**own_tables, **added}.items():
-                files.write_table(staged / name, table, plan.axis)
+
+    def write(folder: Path, done: Files) -> list[Row]:
+        rows = _rows(plan, folder, done)
+        own = {RUNS: rows, LEVELS: tables.levels(rows), PAIRED: tables.pairs(rows)}
+        for name, table in {**own, **(more.tables(done) if more else {})}.items():
+            files.write_table(folder / name, table, plan.axis)
+        return rows
+
+    return Study(
+        command="compare",
+        settings={"compare_schema": SCHEMA, **plan.settings(), "lost_rule": LOST_RULE},
+        slams=plan.slams,
+        scenes=plan.scenes,
+        stages=(*plan.stages(), *(more.stages if more else ())),
+        write=write,
+    )
+
+
+def _rows(plan: Plan, folder: Path, done: Files) -> list[Row]:
+    """Those of ``runs.csv``; each run goes into a file of ``runs/``."""
+    entries: dict[str, dict[str, Path]] = {}
+    for run, slam, job in plan.entries():
+        entries.setdefault(run.name, {})[slam] = done[job.name]
+    rows: list[Row] = []
+    for run in plan.runs():
+        merged = merge(folder / "runs" / f"{run.name}.npz", done[run.name], entries[run.name])
+        about = {k: v for k, v in asdict(run).items() if k != "axis"} | _about(done[run.name])
+        rows += [about | row for row in merged]
     return rows
 
 
@@ -82,7 +93,7 @@ def _about(recording: Path) -> dict[str, float]:
     return dict(zip(DRIVES, values, strict=True))
 
 
-def median_errors(plan: Plan, scene: str, rows: list[dict[str, Any]]) -> Table:
+def median_errors(plan: Plan, scene: str, rows: list[Row]) -> Table:
     """Median error and runs lost, to be printed."""
     summary = {
         (row["dynamism"], row["slam"], row["metric"]): row["value"]

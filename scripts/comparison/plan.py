@@ -14,6 +14,7 @@ from scenes.scene_file import sha256_of
 from scripts.comparison import entry, recording
 from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import LATER, settings
+from scripts.engine import Stage
 from scripts.imports import code_of
 from scripts.jobs import Job
 from scripts.names import file_name
@@ -209,12 +210,21 @@ class Plan(Asked):
                 own |= {} if self.judge_maps else {"judge_maps": False}
                 yield run, name, replace(job.over(run.name, own), seconds=self.seconds)
 
+    def stages(self) -> tuple[Stage, Stage]:
+        """All of these jobs."""
+        simulations = tuple(self.recordings().values())
+        entries = tuple(job for _, _, job in self.entries())
+        return (
+            Stage(title="simulating", folder=RECORDINGS, jobs=simulations),
+            Stage(title="running SLAMs", folder=ENTRIES, jobs=entries),
+        )
+
 
 def ahead(plan: Plan, out: Path) -> tuple[list[Job], int]:
     """The jobs that are not done yet in ``out``, of how many; buildings over days aside."""
-    parts = ((plan.recordings().values(), RECORDINGS), ([e[2] for e in plan.entries()], ENTRIES))
-    every = [(job, out / folder) for jobs, folder in parts for job in jobs]
-    return [job for job, folder in every if not (folder / job.file_name()).exists()], len(every)
+    stages = plan.stages()
+    missing = [job for stage in stages for job in stage.missing(out)]
+    return missing, sum(len(stage.jobs) for stage in stages)
 
 
 def simulator(scene: str) -> tuple[Path, ...]:

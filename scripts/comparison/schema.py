@@ -33,7 +33,7 @@ from slam.answers import LEAST_CELL_M, MOST_CELL_M, MOST_M
 from slam.shaped import Share
 
 SCHEMA = 1
-RUNS, RUNS_JSON, LEVELS, PAIRED = "runs.csv", "runs.json", "levels.csv", "paired.csv"
+RUNS, LEVELS, PAIRED = "runs.csv", "levels.csv", "paired.csv"
 AGES, AGES_LEVELS = "ages.csv", "ages_levels.csv"
 FAILED = ("raised", "hung", "nan", "bad")
 OUTCOMES = ("finished", "lost", *FAILED)

@@ -1,17 +1,18 @@
 # SPDX-License-Identifier: Apache-2.0
 """Many buildings, every SLAM in each: the jobs that it takes, and the rows that come of them."""
 
-from collections.abc import Callable, Iterator
+from collections.abc import Iterator
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
 
-from scripts.comparison.make import Tables
+from scripts.comparison.make import Beside, Tables
 from scripts.comparison.plan import Plan, running, simulating, simulator
 from scripts.comparison.schema import AGES, AGES_LEVELS
 from scripts.days import lifelong, scores
 from scripts.days.sessions import EVERY, checked_count
-from scripts.jobs import Job, run_jobs
+from scripts.engine import Files, Stage, make
+from scripts.jobs import Job
 from scripts.names import file_name
 from sim.recording.recipe import MAX_SECONDS, Recipe
 from slam.errors import InvalidValueError
@@ -96,6 +97,24 @@ class Buildings:
                 building = name_of(recipe)
                 yield recipe, name, job.over(building, {"sessions": files[building]})
 
+    def stages(self, folder: str = "") -> tuple[Stage, Stage]:
+        """All of these jobs, their files in a folder within that of a study."""
+        sessions = tuple(job for own in self.recordings().values() for job in own)
+        lives = tuple(job for _, _, job in self.lives())
+        return (
+            Stage(title="simulating sessions", folder=str(Path(folder, SESSIONS)), jobs=sessions),
+            Stage(title="living in buildings", folder=str(Path(folder, LIVES)), jobs=lives),
+        )
+
+    def rows(self, done: Files) -> list[dict[str, Any]]:
+        """A row (``scores.COLUMNS``) for each SLAM and building."""
+        rows = []
+        for recipe, slam, job in self.lives():
+            found = lifelong.read(done[job.name])
+            of = {**identity(recipe), "slam": slam}
+            rows.append(scores.of_building(of, found["rows"], found["ages"], found["failure"]))
+        return rows
+
 
 def of_comparison(plan: Plan) -> Buildings | None:
     """The buildings beside the runs of a comparison, one at each level; None without sessions."""
@@ -114,25 +133,12 @@ def of_comparison(plan: Plan) -> Buildings | None:
 DAYS = "days"  # folder of what buildings take, within a comparison or a benchmark
 
 
-def carry_out(
-    buildings: Buildings, out: Path, *, jobs: int = 1, cluster: str | None = None
-) -> list[dict[str, Any]]:
-    """Make what is missing in ``out``; a row (``scores.COLUMNS``) for each SLAM and building."""
-    ways: dict[str, Any] = {"processes": jobs, "cluster": cluster}
-    recordings = [job for own in buildings.recordings().values() for job in own]
-    run_jobs(recordings, out / SESSIONS, title="simulating sessions", **ways)
-    lives = list(buildings.lives())
-    only = [job for _, _, job in lives]
-    done = run_jobs(only, out / LIVES, title="living in buildings", **ways)
-    rows = []
-    for recipe, slam, job in lives:
-        found = lifelong.read(done[job.name])
-        of = {**identity(recipe), "slam": slam}
-        rows.append(scores.of_building(of, found["rows"], found["ages"], found["failure"]))
-    return rows
+def carry_out(buildings: Buildings, out: Path, **ways: Any) -> list[dict[str, Any]]:
+    """Make what is missing in ``out``, as ``scripts.engine.make`` does; ``Buildings.rows``."""
+    return buildings.rows(make(buildings.stages(), out, **ways))
 
 
-def beside(plan: Plan) -> Callable[..., Tables] | None:
+def beside(plan: Plan) -> Beside | None:
     """For ``scripts.comparison.make.carry_out``: the buildings of a comparison, and the tables of
     their scores; None of one without sessions. Raises ``InvalidValueError`` for what cannot be.
     """
@@ -140,9 +146,8 @@ def beside(plan: Plan) -> Callable[..., Tables] | None:
     if buildings is None:
         return None
 
-    def make(out: Path, **ways: Any) -> Tables:
-        rows = carry_out(buildings, out / DAYS, **ways)
-        summary = scores.levels(rows)
-        return {AGES: rows, AGES_LEVELS: summary}
+    def tables(done: Files) -> Tables:
+        rows = buildings.rows(done)
+        return {AGES: rows, AGES_LEVELS: scores.levels(rows)}
 
-    return make
+    return Beside(stages=buildings.stages(DAYS), tables=tables)

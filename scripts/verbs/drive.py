@@ -16,7 +16,7 @@ from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
-    from scripts.closed_loop.plan import Plan
+    from scripts.closed_loop.plan import DrivePlan
 
 
 @spec
@@ -51,12 +51,12 @@ class Drive:
     work: options.Work = part(options.Work, without=("cluster",))
     set_: list[str] | None = options.SET()
 
-    def plan(self) -> "Plan":
+    def plan(self) -> "DrivePlan":
         """What is to be driven; ``InvalidValueError`` for what cannot be."""
         slams = with_set(options.named(self.slam), self.set_ or [])
         check(slams, self.scene)
         from scripts import workers
-        from scripts.closed_loop.plan import Plan
+        from scripts.closed_loop.plan import DrivePlan
         from sim.loop import LoopConfig
 
         workers.check_jobs(self.work.jobs)
@@ -65,7 +65,7 @@ class Drive:
             options.every_of(self.scanner, self.every, 4),
             options.named(self.goals or []),
         )
-        return Plan(
+        return DrivePlan(
             scene=self.scene,
             slams=slams,
             **at,

@@ -12,7 +12,7 @@ from typing import Any
 import numpy as np
 
 from scripts.benchmark import runs_file, submission
-from scripts.closed_loop.plan import Plan as DrivePlan
+from scripts.closed_loop.plan import DrivePlan
 from scripts.comparison.plan import ENTRIES, RECORDINGS, Plan
 from scripts.output import write_recipe
 from sim.recording import recipe as recipes

@@ -28,7 +28,7 @@ PLAN = Plan(
     seeds=(7,), seconds=5.0, every=5, scanner="noise", sessions=2, judge_maps=False,
 )  # fmt: skip
 OF_THE_MACHINE = ("ms_per_scan_early", "ms_per_scan_late", "load_s_early", "load_s_late")
-TABLES = ("runs.csv", "runs.json", "levels.csv", "paired.csv")
+TABLES = ("runs.csv", "levels.csv", "paired.csv")
 
 
 @pytest.fixture(scope="module")

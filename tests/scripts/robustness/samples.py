@@ -13,7 +13,7 @@ import numpy as np
 
 from scripts import results
 from scripts.closed_loop import make as drives
-from scripts.closed_loop.plan import Plan as DrivePlan
+from scripts.closed_loop.plan import DrivePlan
 from scripts.closed_loop.tables import driven
 from scripts.comparison import make as comparisons
 from scripts.comparison.folder import read

@@ -8,19 +8,19 @@ import pytest
 
 from scripts.closed_loop import tables
 from scripts.closed_loop.make import carry_out
-from scripts.closed_loop.plan import Plan
+from scripts.closed_loop.plan import DrivePlan
 from scripts.closed_loop.runs import DrivenRun, load, run_one
 from scripts.verbs.drive import _seeds
 from sim.loop import LoopConfig
 
 pytestmark = pytest.mark.slow
 SHORT = {"goals": 1, "loop": LoopConfig(limit_s=1.0)}
-FILES = ("goals.csv", "runs.csv", "levels.csv", "runs.json", "closed_loop.png", "paths.png")
+FILES = ("goals.csv", "runs.csv", "levels.csv", "closed_loop.png", "paths.png")
 
 
 def plan(**changes):
     settings = {"scene": "arena", "slams": ("odometry",), "levels": (0.0,), "seeds": (100,)}
-    return Plan(**{**settings, **SHORT, **changes})
+    return DrivePlan(**{**settings, **SHORT, **changes})
 
 
 def read(path):
