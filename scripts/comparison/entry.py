@@ -40,50 +40,33 @@ class PeakMemory:
 
     def __init__(self) -> None:
         gc.collect()
-        _give_back()
+        with suppress(OSError, AttributeError):  # of another C library
+            ctypes.CDLL(None).malloc_trim(0)  # what is freed goes back: the next one's growth shows
         self._base_kb = reading_kb("VmRSS")
         self._peak_kb = self._base_kb
 
     def begin(self) -> None:
         """Forget the peak so far."""
-        if not forget_peak():
+        try:
+            _CLEAR.write_text("5")  # proc(5)
+        except OSError:
             self._peak_kb = math.nan
 
     def end(self) -> None:
         """Note the peak since ``begin``."""
         self._peak_kb = max(self._peak_kb, reading_kb("VmHWM"))  # NaN stays: it compares False
 
-    @property
-    def growth_mb(self) -> float:
-        """MB (1e6 bytes)."""
-        return (self._peak_kb - self._base_kb) * 1024.0 / 1e6
-
-
-def _give_back() -> None:
-    """Return freed memory to the system, so that the next one's growth shows."""
-    try:
-        ctypes.CDLL(None).malloc_trim(0)
-    except (OSError, AttributeError):  # another C library
-        return
-
-
-def forget_peak() -> bool:
-    """From now on the process's peak is what is held now; whether the kernel can do that."""
-    try:
-        _CLEAR.write_text("5")  # proc(5)
-    except OSError:
-        return False
-    return True
+    def growth_bytes(self) -> float:
+        """So much more than at the start."""
+        return (self._peak_kb - self._base_kb) * 1024.0
 
 
 def reading_kb(name: str) -> float:
     """A line of this process's status file, "VmRSS" or "VmHWM", kB; NaN without one."""
-    try:
+    with suppress(OSError):
         for line in _STATUS.read_text().splitlines():
             if line.startswith(name + ":"):
                 return float(line.split()[1])
-    except OSError:
-        pass
     return math.nan
 
 
@@ -157,25 +140,21 @@ class Entry:
                 self.memory.begin()
                 self.track.take(frame)
                 self.memory.end()
-                if self.judge is not None:
-                    self._judge(self.judge, k)
+                if self.judge is not None and self.judge.wants_map(k):
+                    self.raster = self.track.map()
+                    self.judge.judge(k, self.raster)
             self.raster = self.track.map()
             self.final = self.track.final()
         except SlamFailedError as error:
             self.failure = error
-
-    def _judge(self, judge: MapJudge, k: int) -> None:
-        judge.look(k)
-        if judge.wants(k):
-            self.raster = self.track.map()
-            judge.judge(k, self.raster)
 
     def arrays(self) -> dict[str, Any]:
         """What the file holds: arrays, and the row of ``runs.csv`` as JSON."""
         track, raster = self.track, self.raster
         online = track.online()
         row = scored(track, self.final, self.failure, self.drive.truth())
-        row["peak_memory_mb"] = self._peak_memory_mb()
+        grown = getattr(track.system, "memory_growth_bytes", self.memory.growth_bytes)()
+        row["peak_memory_mb"] = None if grown is None else grown / 1e6
         row |= {} if self.judge is None else self.judge.scores()
         arrays: dict[str, Any] = {
             "stamps_ns": online.stamps_ns,
@@ -193,13 +172,6 @@ class Entry:
             }
         return arrays
 
-    def _peak_memory_mb(self) -> float | None:
-        of_its_own = getattr(self.track.system, "memory_growth_bytes", None)
-        if of_its_own is None:
-            return self.memory.growth_mb
-        grown = of_its_own()
-        return None if grown is None else grown / 1e6
-
 
 def _bytes(values: Float | Any) -> Any:
     """A raster's values in 0..254, ``UNKNOWN`` for NaN."""
@@ -216,30 +188,21 @@ def scored(
     """The row of one SLAM, its maps and identity aside; None where there is no number."""
     steady_s = np.array(track.durations_s[STEADY_SCANS:])
     judged = replace(Judged.of(track, None, final), steady_s=steady_s)
-    row: dict[str, Any] = {"scans": len(track.estimates), **_computed(judged)}
-    lost_at_s = lost_at(track.online(), truth)
-    if failure is not None:
-        outcome = getattr(failure, "outcome", "raised")
-        if lost_at_s is None:
-            # of the scan that it did not answer
+    row: dict[str, Any] = {"scans": len(track.estimates), **_computed(judged), "failure": None}
+    online = track.online()
+    lost_at_s = lost_s(metrics.pose_errors(online, truth), truth) if len(online) else None
+    outcome = "finished" if lost_at_s is None else "lost"
+    if failure is None:
+        row |= _computed(replace(judged, truth=truth))
+    else:
+        outcome, row["failure"] = failure.outcome, str(failure)
+        if lost_at_s is None:  # at the scan that it did not answer
             k = min(len(track.estimates), len(truth) - 1)
             lost_at_s = float(truth.stamps_ns[k] - truth.stamps_ns[0]) / NS_PER_S
-        return row | {
-            "outcome": outcome, "failure": str(failure), "lost": 1, "lost_at_s": lost_at_s,
-        }  # fmt: skip
-    row |= {"outcome": "finished" if lost_at_s is None else "lost", "failure": None}
-    row |= {"lost": int(lost_at_s is not None), "lost_at_s": lost_at_s}
-    return row | _computed(replace(judged, truth=truth))
+    return row | {"outcome": outcome, "lost": int(lost_at_s is not None), "lost_at_s": lost_at_s}
 
 
 def _computed(judged: Judged) -> dict[str, Any]:
     """The columns that the table of metrics computes, those without a value left out."""
     values = {key: table.METRICS[key].of(judged) for key in table.COLUMNS}
     return {key: value for key, value in values.items() if value is not None}
-
-
-def lost_at(online: Trajectory, truth: Trajectory) -> float | None:
-    """Seconds from the start to the loss (``slam.evaluation.lost``); None if it never was lost."""
-    if len(online) == 0:
-        return None
-    return lost_s(metrics.pose_errors(online, truth), truth)

@@ -241,12 +241,9 @@ class MapJudge:
         self._ghosts: list[float] = []
         self._found: list[bool] = []
 
-    def look(self, k: int) -> None:
-        """Take in scan k, before the map after it is judged."""
+    def wants_map(self, k: int) -> bool:
+        """Take in scan k; whether the map after it is to be judged."""
         self._places.look(k, Sight(self._drive, k))
-
-    def wants(self, k: int) -> bool:
-        """Whether the map after scan k is to be judged."""
         return float(self._seconds[k]) >= self._next_s
 
     def judge(self, k: int, raster: Raster | None) -> None:

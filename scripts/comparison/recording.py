@@ -21,9 +21,8 @@ from slam.system import Raster
 from slam.trajectory import Trajectory
 
 NOTHING, STATIC = -2, -1  # of ``Recording.hit``
-_SPEC = ("n_beams", "angle_min", "angle_increment", "range_min", "range_max")
-_SPEC_LATER = ("range_sigma_m",)  # recordings of before have none: not stated
-_SPEC_ARRAYS = ("beam_time_offsets", "T_robot_laser")
+_NUMBERS = ("n_beams", "angle_min", "angle_increment", "range_min", "range_max", "range_sigma_m")
+_SPEC = (*_NUMBERS, "beam_time_offsets", "T_robot_laser")
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -75,8 +74,7 @@ def record(path: Path, *, every: int, **recipe: Any) -> None:
         rows.append(_row(moment, mover, labels.kind))
     truth_map = scene.static_map
     arrays: dict[str, Any] = {name: np.array([row[name] for row in rows]) for name in rows[0]}
-    told = (*_SPEC, *_SPEC_LATER, *_SPEC_ARRAYS)
-    arrays |= {f"laser_{name}": getattr(simulation.spec, name) for name in told}
+    arrays |= {f"laser_{name}": getattr(simulation.spec, name) for name in _SPEC}
     np.savez_compressed(
         path,
         **arrays,
@@ -160,9 +158,8 @@ def _labels(kind: NDArray[np.uint8], hit: NDArray[np.int16]) -> BeamLabels:
 
 
 def _recording(a: Mapping[str, Any]) -> Recording:
-    there = [name for name in _SPEC_LATER if f"laser_{name}" in a]
-    scalars = {name: a[f"laser_{name}"].item() for name in (*_SPEC, *there)}
-    spec = LaserSpec(**scalars, **{name: a[f"laser_{name}"] for name in _SPEC_ARRAYS})
+    laser = {name: a[f"laser_{name}"] for name in _SPEC}
+    spec = LaserSpec(**{k: v.item() if k in _NUMBERS else v for k, v in laser.items()})
     frames = [
         Frame(
             stamp_ns=int(stamp_ns),

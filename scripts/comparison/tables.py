@@ -4,7 +4,7 @@
 import csv
 import io
 import math
-from collections.abc import Iterable, Iterator, Mapping, Sequence
+from collections.abc import Callable, Iterable, Iterator, Mapping, Sequence
 from itertools import combinations
 from pathlib import Path
 from typing import Any, TypeVar
@@ -33,30 +33,44 @@ def number(row: Row, metric: str) -> float | None:
 
 def levels(rows: Sequence[Row]) -> list[Row]:
     """Median, interval and quartiles of each metric; of losses the share."""
-    out = []
-    for (scene, dynamism, slam), group in grouped(rows, ("scene", "dynamism", "slam")).items():
-        for metric in (*SHARES, *MEDIANS):
-            values = [v for v in (number(row, metric) for row in group) if v is not None]
-            if values:
-                head = {"scene": scene, "dynamism": dynamism, "slam": slam, "metric": metric}
-                out.append(head | _summary(values, metric in SHARES))
-    return out
+
+    def summed(metric: str, group: Sequence[Row]) -> Row:
+        values = [v for v in (number(row, metric) for row in group) if v is not None]
+        if metric in SHARES or not values:
+            return share_of(round(sum(values)), len(values))
+        quartiles = {"q25": quantile(values, 0.25), "q75": quantile(values, 0.75)}
+        return median_of(values) | quartiles
+
+    return summary(rows, ("scene", "dynamism", "slam"), (*SHARES, *MEDIANS), summed)
 
 
-def _summary(values: list[float], is_share: bool) -> Row:
-    if is_share:
-        return share_of(round(sum(values)), len(values))
-    return median_of(values) | {"q25": quantile(values, 0.25), "q75": quantile(values, 0.75)}
+def summary(
+    rows: Sequence[R],
+    keys: Sequence[str],
+    metrics: Iterable[str],
+    summed: Callable[[str, list[R]], Row],
+) -> list[Row]:
+    """A row of each metric for the rows of each key; none where ``summed`` makes none of them."""
+    return [
+        {**dict(zip(keys, key, strict=True)), "metric": metric, **found}
+        for key, group in grouped(rows, keys).items()
+        for metric in metrics
+        if (found := summed(metric, group))
+    ]
 
 
 def share_of(hits: int, n: int) -> Row:
-    """So many of ``n`` in the columns of a summary, with Wilson's 95 % interval."""
+    """So many of ``n`` in the columns of a summary, with Wilson's 95 % interval; {} of none."""
+    if n == 0:
+        return {}
     low, high = share_interval(hits, n)
     return {"statistic": "share", "n": n, "value": hits / n, "low": low, "high": high}
 
 
 def median_of(values: Sequence[float]) -> Row:
-    """The median in the columns of a summary, with its 95 % bootstrap interval."""
+    """The median in the columns of a summary, with its 95 % bootstrap interval; {} of none."""
+    if not values:
+        return {}
     low, high = median_interval(values)
     value = quantile(values, 0.5)
     return {"statistic": "median", "n": len(values), "value": value, "low": low, "high": high}

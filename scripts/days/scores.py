@@ -14,7 +14,7 @@ from typing import Any
 from scripts.comparison import schema
 from scripts.comparison.schema import ANEW, DAYS, OVER_TIME
 from scripts.comparison.schema import OLD as AGES
-from scripts.comparison.tables import grouped, median_of, share_of
+from scripts.comparison.tables import median_of, share_of, summary
 from sim.world.times_of_day import DAY
 
 Row = Mapping[str, Any]
@@ -185,23 +185,14 @@ def levels(rows: Sequence[Row]) -> list[dict[str, Any]]:
 
     Medians with their bootstrap interval; shares of all sessions with Wilson's. Both are of 95 %.
     """
-    out = []
-    columns = ("scene", "motion", "change", "slam")
-    for key, group in grouped(rows, columns).items():
-        head = dict(zip(columns, key, strict=True))
-        for score in SCORES:
-            if summed := _share(score, group) if score.hits else _median(score, group):
-                out.append({**head, "metric": score.key, **summed})
-    return out
+    by_key = {score.key: score for score in SCORES}
 
+    def summed(metric: str, group: Sequence[Row]) -> dict[str, Any]:
+        score = by_key[metric]
+        own = [row for row in group if row[score.hits or score.key] is not None]
+        if not score.hits:
+            return median_of([float(row[metric]) for row in own])
+        n = sum(int(row[score.of]) for row in own) if score.of else len(own)
+        return share_of(sum(int(row[score.hits]) for row in own), n)
 
-def _share(score: Score, group: Sequence[Row]) -> dict[str, Any]:
-    own = [row for row in group if row[score.hits] is not None]
-    hits = sum(int(row[score.hits]) for row in own)
-    n = sum(int(row[score.of]) for row in own) if score.of else len(own)
-    return share_of(hits, n) if n else {}
-
-
-def _median(score: Score, group: Sequence[Row]) -> dict[str, Any]:
-    values = [float(row[score.key]) for row in group if row[score.key] is not None]
-    return median_of(values) if values else {}
+    return summary(rows, ("scene", "motion", "change", "slam"), by_key, summed)

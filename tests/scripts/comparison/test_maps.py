@@ -24,8 +24,7 @@ def judged(drive, map_after) -> MapJudge:
     """Scores of the maps ``map_after(k)``, asked for as a comparison does."""
     judge = MapJudge(drive)
     for k in range(len(drive.frames)):
-        judge.look(k)
-        if judge.wants(k):
+        if judge.wants_map(k):
             judge.judge(k, map_after(k))
     return judge
 
