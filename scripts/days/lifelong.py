@@ -13,8 +13,9 @@ import numpy as np
 
 from scripts.comparison.maps import NEAR_M, Believed, StaticDistance, clearance, seen_empty
 from scripts.comparison.recording import Recording
+from scripts.comparison.tables import Row
 from scripts.days import truth
-from scripts.days.sessions import Drive, loaded
+from scripts.days.sessions import SessionDrive, loaded
 from scripts.days.truth import Still, stands_there, still_things
 from scripts.names import file_name
 from scripts.result_files import load
@@ -26,7 +27,7 @@ from slam.files import write_text
 from slam.frames import NS_PER_S, Float
 from slam.guests import Limits, limited
 from slam.replay import Replay, Track
-from slam.system import SlamSystem, create
+from slam.system import create
 from slam.tracker.tracker import Tracker
 
 RIGHT_M, RIGHT_RAD = 0.5, 0.35  # of the true pose: the place that was found is the right one
@@ -50,7 +51,6 @@ class Building:
     T_map_world the frame of the first session's map; None before, or without truth
     snapshots   what each session that fitted saw, by its number
     copies      its map after each of them, where maps of some age are asked for
-    aged        rows (``truth.AGE_COLUMNS``) of the last session in older maps
     before      the last session that was merged, where it was simulated
     limits      of a SLAM from outside, which then runs in a process of its own; None: here
     failures    what was said when it failed, in order
@@ -63,15 +63,18 @@ class Building:
     T_map_world: Float | None = None
     snapshots: dict[int, Snapshot] = field(default_factory=dict)
     copies: dict[int, Path] = field(default_factory=dict)
-    aged: list[dict[str, Any]] = field(default_factory=list)
     before: Recording | None = None
     limits: Limits | None = None
     failures: list[str] = field(default_factory=list)
     replays: Path | None = None
 
-    def system(self) -> SlamSystem:
-        """A new one of the SLAM; ``SlamFailedError`` for one from outside that cannot start."""
-        return limited(self.name, self.limits)
+    def session(self, path: Path, drive: SessionDrive) -> Session:
+        """A session in the map of a file, or the first one where there is no such file."""
+        system = create(self.name)
+        assert isinstance(system, Tracker)
+        if not path.exists():
+            return Session(system, time_s=drive.time_s)
+        return Session.open(path, type(system), time_s=drive.time_s)
 
 
 def started(names: Sequence[str], folder: Path, limits: Limits | None = None) -> list[Building]:
@@ -90,54 +93,69 @@ def started(names: Sequence[str], folder: Path, limits: Limits | None = None) ->
 
 
 def lived(
-    buildings: Sequence[Building], drives: Iterator[Drive]
-) -> tuple[list[dict[str, Any]], list[dict[str, Any]]]:
+    buildings: Sequence[Building], drives: Iterator[SessionDrive]
+) -> tuple[list[Row], list[Row]]:
     """A row (``COLUMNS``) for each session and SLAM, and those of the last session in older maps
     (``truth.AGE_COLUMNS``).
     """
     rows, aged = [], []
     for drive in drives:
-        rows += [_anew(one, drive) if one.anew else _merged(one, drive) for one in buildings]
+        rows += [_row(building, drive) for building in buildings]
         last = drive
     for building in buildings:
         aged += [] if building.anew else list(_age_rows(building, last))
     return rows, aged
 
 
-def _merged(building: Building, drive: Drive) -> dict[str, Any]:
-    """A session in the map so far, merged into it if it fits."""
-    system = create(building.name)
-    assert isinstance(system, Tracker)
-    before = time.process_time()
+def _row(building: Building, drive: SessionDrive) -> Row:
+    """A session in the map so far, or on its own where the SLAM cannot load a map."""
     first = not building.map.exists()
-    if first:
-        session = Session(system, time_s=drive.time_s)
-    else:
-        session = Session.open(building.map, type(system), time_s=drive.time_s)
-    loaded_s = time.process_time() - before
-    track = Track(building.name, session)
-    row = _row(building, drive, "new" if first else "kept", track)
-    if "place" in row:
-        return row
-    if first and drive.frames[0].truth is not None:
-        building.T_map_world = se2.inverse(drive.frames[0].truth)
-    state = session.state
-    row["start"] = _start(session, building.T_map_world, drive)
-    row["disagrees"] = None if first or state.found_after_s is None else state.disagrees
-    row["found_after_s"] = state.found_after_s
-    row["tracked"] = state.tracked
+    head: Row = {
+        **dict.fromkeys(COLUMNS), "slam": building.name, "session": drive.number,
+        "time_of_day": drive.time_of_day,
+        "map": "anew" if building.anew else "new" if first else "kept",
+    }  # fmt: skip
+    try:
+        started = time.process_time()
+        session = None if building.anew else building.session(building.map, drive)
+        loaded_s = time.process_time() - started
+        system = limited(building.name, building.limits) if session is None else session
+        track = Track(building.name, system)
+        if failure := _survive(building, drive, track):
+            raise failure
+        row = head | {"ms_per_scan": 1e3 * float(np.median(track.durations_s))}
+        if session is None:
+            return row | _anew(drive, track)
+        return row | {"load_s": loaded_s} | _merged(building, drive, session, track)
+    except SlamFailedError as error:  # at its start, on the way, or what it gave as its map
+        building.failures.append(str(error))
+        return head | {"place": "failed"}
+
+
+def _anew(drive: SessionDrive, track: Track) -> Row:
+    """Of a session on its own, in its own frame."""
+    truth = drive.frames[0].truth
+    T_map_world = None if truth is None else se2.inverse(truth)
+    errors = _errors(T_map_world, drive, track, 0)
+    return {**errors, "place": "", **_map_scores(T_map_world, drive, track)}
+
+
+def _merged(building: Building, drive: SessionDrive, session: Session, track: Track) -> Row:
+    """Of a session in the map so far, which is merged into it if it fits."""
+    state, first, truth_0 = session.state, not building.map.exists(), drive.frames[0].truth
+    if first and truth_0 is not None:
+        building.T_map_world = se2.inverse(truth_0)
+    searched = _searched(track)
+    row: Row = {
+        "start": _start(session, building.T_map_world, drive),
+        "disagrees": None if first or state.found_after_s is None else state.disagrees,
+        "found_after_s": state.found_after_s, "tracked": state.tracked,
+        **_errors(building.T_map_world, drive, track, searched),
+    }  # fmt: skip
     written = keep(session, building.map)
-    if state.fits:
-        building.snapshots[drive.number] = session.known().sessions[-1]
-        building.copies[drive.number] = truth.keep_copy(
-            building.map, building.map.parent / "maps", drive.number
-        )
     row["map"] = "new" if first else "merged" if state.fits else written.name
-    row["load_s"] = loaded_s
     row["map_kb"] = written.stat().st_size / 1e3
     row["memory_mb"] = sum(a.nbytes for a in session.tracker.cell_map.cells) / 1e6
-    searched = sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
-    row |= _errors(building.T_map_world, drive, track, searched)
     if state.found_after_s is not None:
         row |= _map_scores(building.T_map_world, drive, track)
         if building.before is not None and drive.recording is not None:
@@ -145,29 +163,34 @@ def _merged(building: Building, drive: Drive) -> dict[str, Any]:
             row |= truth.verdicts(track.estimates, shares, searched)
     if state.fits:  # else the map knows nothing of it
         building.before = drive.recording
+        building.snapshots[drive.number] = session.known().sessions[-1]
+        building.copies[drive.number] = truth.keep_copy(
+            building.map, building.map.parent / "maps", drive.number
+        )
     return row
 
 
-def _age_rows(building: Building, drive: Drive) -> Iterator[dict[str, Any]]:
+def _searched(track: Track) -> int:
+    """Scans before the start was found."""
+    return sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
+
+
+def _age_rows(building: Building, drive: SessionDrive) -> Iterator[Row]:
     """Of that session in maps some sessions old; none of them is written to."""
-    kept = sorted(building.copies)
-    for age, number in truth.ages_of(kept, drive.number):
-        kind = type(create(building.name))
-        assert issubclass(kind, Tracker)
-        session = Session.open(building.copies[number], kind, time_s=drive.time_s)
+    for age, number in truth.ages_of(sorted(building.copies), drive.number):
+        session = building.session(building.copies[number], drive)
         track = Track(building.name, session)
-        row: dict[str, Any] = dict.fromkeys(truth.AGE_COLUMNS)
+        row: Row = dict.fromkeys(truth.AGE_COLUMNS)
         row |= {"slam": building.name, "age": age, "session": drive.number}
         if track.survive(drive.frames) is not None:
             yield row | {"place": "failed"}
             continue
         state = session.state
         row |= {"found_after_s": state.found_after_s, "tracked": state.tracked}
-        searched = sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
-        yield row | _errors(building.T_map_world, drive, track, searched)
+        yield row | _errors(building.T_map_world, drive, track, _searched(track))
 
 
-def _start(session: Session, T_map_world: Float | None, drive: Drive) -> str:
+def _start(session: Session, T_map_world: Float | None, drive: SessionDrive) -> str:
     """Whether a session before this one saw the place where the robot starts; "" without truth."""
     truth, history = drive.frames[0].truth, session.history
     if T_map_world is None or truth is None or not len(history):
@@ -178,24 +201,7 @@ def _start(session: Session, T_map_world: Float | None, drive: Drive) -> str:
     return "known" if near.any() else "unknown"
 
 
-def _anew(building: Building, drive: Drive) -> dict[str, Any]:
-    """A session on its own: the SLAM cannot load a map."""
-    try:
-        track = Track(building.name, building.system())
-        row = _row(building, drive, "anew", track)
-        if "place" in row:
-            return row
-        truth = drive.frames[0].truth
-        T_map_world = None if truth is None else se2.inverse(truth)
-        row |= _errors(T_map_world, drive, track, 0)
-        row["place"] = ""
-        return row | _map_scores(T_map_world, drive, track)
-    except SlamFailedError as error:  # at its start, or what it gave as its map
-        building.failures.append(str(error))
-        return _head(building, drive, "anew") | {"place": "failed"}
-
-
-def _survive(building: Building, drive: Drive, track: Track) -> SlamFailedError | None:
+def _survive(building: Building, drive: SessionDrive, track: Track) -> SlamFailedError | None:
     """Let it see every frame, and make a page of that where one is wanted; what ended it."""
     if building.replays is None:
         return track.survive(drive.frames)
@@ -216,26 +222,7 @@ def _survive(building: Building, drive: Drive, track: Track) -> SlamFailedError 
         return track.survive(recorder.noting(drive.frames))
 
 
-def _row(building: Building, drive: Drive, state: str, track: Track) -> dict[str, Any]:
-    """Let it see every frame; the row so far, with ``place`` "failed" if it failed."""
-    row = _head(building, drive, state)
-    failure = _survive(building, drive, track)
-    if failure is not None:
-        building.failures.append(str(failure))
-        return row | {"place": "failed", "map": "kept" if state == "kept" else state}
-    del row["place"]
-    row["ms_per_scan"] = 1e3 * float(np.median(track.durations_s))
-    return row
-
-
-def _head(building: Building, drive: Drive, state: str) -> dict[str, Any]:
-    """Who and when; the rest of the columns None."""
-    row: dict[str, Any] = dict.fromkeys(COLUMNS)
-    row |= {"slam": building.name, "session": drive.number, "time_of_day": drive.time_of_day}
-    return row | {"map": state}
-
-
-def _errors(T_map_world: Float | None, drive: Drive, track: Track, searched: int) -> dict[str, Any]:
+def _errors(T_map_world: Float | None, drive: SessionDrive, track: Track, searched: int) -> Row:
     """Of the poses from the scan on that found the start; ``place`` is where that was."""
     if searched == len(track.estimates):
         return {"place": "not found"}
@@ -257,7 +244,7 @@ def _errors(T_map_world: Float | None, drive: Drive, track: Track, searched: int
     }
 
 
-def _map_scores(T_map_world: Float | None, drive: Drive, track: Track) -> dict[str, Any]:
+def _map_scores(T_map_world: Float | None, drive: SessionDrive, track: Track) -> Row:
     """Ghosts and recall of the map at the end of a simulated session."""
     recording, raster = drive.recording, track.map()
     if recording is None or raster is None or T_map_world is None:
@@ -268,11 +255,10 @@ def _map_scores(T_map_world: Float | None, drive: Drive, track: Track) -> dict[s
     near = np.minimum(near, clearance(occupied, recording, len(recording.frames) - 1))
     held = [believed.holds(thing.points) for thing in _standing(recording)]
     ghosts = occupied[near > NEAR_M]
+    seen, n = seen_empty(ghosts, recording).sum(), len(occupied)
     return {
-        "ghost_rate": len(ghosts) / len(occupied) if len(occupied) else None,
-        "ghost_seen_rate": float(seen_empty(ghosts, recording).sum()) / len(occupied)
-        if len(occupied)
-        else None,
+        "ghost_rate": len(ghosts) / n if n else None,
+        "ghost_seen_rate": float(seen) / n if n else None,
         "recall": float(np.mean(held)) if held else None,
     }
 

@@ -3,7 +3,7 @@
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, fields
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,7 @@ from matplotlib.patches import Circle
 
 from scripts.console import plain_table
 from scripts.days.lifelong import Building
-from scripts.days.sessions import Drive
+from scripts.days.sessions import SessionDrive
 from scripts.days.truth import LEAST_M, ChangeScore, changed_spots, scored
 from scripts.figures import save, styled
 from scripts.metrics.table import minus
@@ -45,7 +45,7 @@ class Changed:
     score: dict[str, Any] | None = None
 
 
-def changes_of(folder: Path, building: Building, drives: Mapping[int, Drive]) -> Changed:
+def changes_of(folder: Path, building: Building, drives: Mapping[int, SessionDrive]) -> Changed:
     """Pictures and changes.csv into ``folder``.
 
     Each session is compared with the one before that fitted; scored where it was simulated.
@@ -98,13 +98,9 @@ def operator(shown: Sequence[Change], every: Sequence[Change]) -> str:
 
 def added(scores: Sequence[ChangeScore]) -> dict[str, Any]:
     """The counts of all (``ChangeScore``), and the median position error, m."""
-    off = [m for s in scores for m in s.off_m]
-    counts: dict[str, Any] = {
-        name: sum(getattr(s, name) for s in scores) for name in ("listed", "right", "seen", "told")
-    }
-    for name in ("doors", "moved"):
-        pairs = [getattr(s, name) for s in scores]
-        counts[name] = [sum(p[0] for p in pairs), sum(p[1] for p in pairs)]
+    each = {f.name: [getattr(score, f.name) for score in scores] for f in fields(ChangeScore)}
+    off = [m for own in each.pop("off_m") for m in own]
+    counts = {name: np.sum(values, axis=0).tolist() for name, values in each.items()}
     return counts | {"off_m": float(np.median(off)) if off else None}
 
 
@@ -123,7 +119,7 @@ def _rows(found: Mapping[tuple[int, int], Sequence[Change]]) -> list[list[object
 def _score(
     changes: Sequence[Change],
     building: Building,
-    drives: Mapping[int, Drive],
+    drives: Mapping[int, SessionDrive],
     numbers: tuple[int, int],
     cell_m: float,
 ) -> ChangeScore | None:

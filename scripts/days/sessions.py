@@ -18,20 +18,28 @@ EVERY = 5  # of the scans of a simulated session one in so many is kept: 7.5 a s
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Drive:
+class SessionDrive:
     """One session.
 
     recording  what a simulated one also holds: what stood where, what each beam met; else None
     """
 
     number: int
-    time_s: float
-    time_of_day: str
     frames: Sequence[Frame]
     recording: Recording | None = None
 
+    @property
+    def time_s(self) -> float:
+        """When it begins, since midnight before the first one."""
+        return clock_s(self.number)
 
-def simulated(recipe: Recipe, sessions: int, first_seconds: float) -> Iterator[Drive]:
+    @property
+    def time_of_day(self) -> str:
+        """In a word."""
+        return time_of(self.number).name
+
+
+def simulated(recipe: Recipe, sessions: int, first_seconds: float) -> Iterator[SessionDrive]:
     """Sessions 0, 1, ... of a building; the first, which maps it, lasts ``first_seconds``."""
     for number in range(sessions):
         seconds = first_seconds if number == 0 else recipe.seconds
@@ -40,24 +48,14 @@ def simulated(recipe: Recipe, sessions: int, first_seconds: float) -> Iterator[D
             path = Path(folder) / "session.npz"
             record(path, every=EVERY, **asdict(wanted))
             drive = load(path)
-        yield _drive(number, drive.frames, drive)
+        yield SessionDrive(number=number, frames=drive.frames, recording=drive)
 
 
-def loaded(files: Sequence[Path]) -> Iterator[Drive]:
+def loaded(files: Sequence[Path]) -> Iterator[SessionDrive]:
     """The same from files, one for each session from 0 on, as ``record`` wrote them."""
     for number, path in enumerate(files):
         drive = load(path)
-        yield _drive(number, drive.frames, drive)
-
-
-def _drive(number: int, frames: Sequence[Frame], recording: Recording | None = None) -> Drive:
-    return Drive(
-        number=number,
-        time_s=clock_s(number),
-        time_of_day=time_of(number).name,
-        frames=frames,
-        recording=recording,
-    )
+        yield SessionDrive(number=number, frames=drive.frames, recording=drive)
 
 
 def recorded(folder: Path) -> list[tuple[int, Path]]:
@@ -87,10 +85,10 @@ def recorded(folder: Path) -> list[tuple[int, Path]]:
     return sorted(found.items())
 
 
-def read(folder: Path) -> Iterator[Drive]:
+def read(folder: Path) -> Iterator[SessionDrive]:
     """The sessions of a dataset, in order."""
     for number, path in recorded(folder):
-        yield _drive(number, list(open_log(path).frames()))
+        yield SessionDrive(number=number, frames=list(open_log(path).frames()))
 
 
 def checked_count(sessions: int) -> int:

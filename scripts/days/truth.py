@@ -67,10 +67,18 @@ class Still:
     def middle(self) -> tuple[float, float]:
         """Of what a beam may meet: of a door, the middle of its leaf."""
         x, y, yaw = self.pose
-        if not is_door(self.kind):
-            return x, y
-        half = 0.5 * self.radius_m
+        half = 0.5 * self.radius_m if self.door else 0.0
         return x + half * math.cos(yaw), y + half * math.sin(yaw)
+
+    @property
+    def door(self) -> bool:
+        """Whether it is one."""
+        return is_door(self.kind)
+
+    @property
+    def size_m(self) -> float:
+        """Width of a door's leaf, diameter of anything else."""
+        return self.radius_m if self.door else 2.0 * self.radius_m
 
 
 def still_things(recording: Recording) -> list[Still]:
@@ -107,7 +115,7 @@ def rests(recording: Recording) -> list[Still]:
 
 def stands_there(thing: Still, pose: Float) -> bool:
     """Whether it stands still where it did; of a door, whether its leaf is there."""
-    turned = abs(se2.wrap(float(pose[2]) - thing.pose[2])) if is_door(thing.kind) else 0.0
+    turned = abs(se2.wrap(float(pose[2]) - thing.pose[2])) if thing.door else 0.0
     return math.dist(pose[:2].tolist(), thing.pose[:2]) < STILL_M and turned < STILL_RAD
 
 
@@ -170,12 +178,11 @@ def changed_spots(
             later = [t for t in places[other] if t.name == thing.name]
             if any(_same(thing, t) for t in later):
                 continue
-            size = thing.radius_m if is_door(thing.kind) else 2.0 * thing.radius_m
             at = se2.transform(T_map_world, np.array([thing.middle()]))[0]
             seen = len(thing.points) >= SEEN_BEAMS
-            seen &= _seen_share(snapshots[other], at, 0.5 * size, cell_m) >= SEEN_SHARE
+            seen &= _seen_share(snapshots[other], at, 0.5 * thing.size_m, cell_m) >= SEEN_SHARE
             rest = [t for t in places[other] if t.name != thing.name and t.share >= STILL_SHARE]
-            asked = size >= LEAST_M and not any(
+            asked = thing.size_m >= LEAST_M and not any(
                 math.dist(one.middle(), thing.middle()) < one.radius_m + 0.5 * thing.radius_m
                 for one in rest
             )
@@ -185,11 +192,9 @@ def changed_spots(
                 asked &= _elsewhere(thing, later[0], ELSEWHERE_M, TURNED_RAD)
             elif _inside(thing.name, recordings[other]):
                 asked = False  # it was about, and may have been in its place for a while
-            where = (float(at[0]), float(at[1]))
-            door = is_door(thing.kind)
-            found.append(
-                Spot(at=where, name=thing.name, came=came, seen=seen, asked=asked, door=door)
-            )
+            x, y = at.tolist()
+            told = {"came": came, "seen": seen, "asked": asked, "door": thing.door}
+            found.append(Spot(at=(x, y), name=thing.name, **told))
     return found
 
 
@@ -215,7 +220,7 @@ def _inside(name: str, recording: Recording) -> bool:
 
 
 def _elsewhere(one: Still, other: Still, least_m: float, least_rad: float) -> bool:
-    if is_door(one.kind) and abs(se2.wrap(one.pose[2] - other.pose[2])) > least_rad:
+    if one.door and abs(se2.wrap(one.pose[2] - other.pose[2])) > least_rad:
         return True
     return math.dist(one.pose[:2], other.pose[:2]) > least_m
 
@@ -226,19 +231,12 @@ def _seen_share(snapshot: Snapshot, at: Float, radius_m: float, cell_m: float) -
         return 0.0
     low, images = dense(snapshot.cells, snapshot.standing)
     n = max(1, math.ceil(radius_m / cell_m))
-    i, j = (np.floor(at / cell_m).astype(int) - low).tolist()
-    height, width = images[0].shape
-    known = 0
-    total = 0
-    for dj in range(-n, n + 1):
-        for di in range(-n, n + 1):
-            if di * di + dj * dj > n * n:
-                continue
-            total += 1
-            row, column = j + dj, i + di
-            if 0 <= row < height and 0 <= column < width:
-                known += not np.isnan(images[0][row, column])
-    return known / total
+    x, y = np.mgrid[-n : n + 1, -n : n + 1].reshape(2, -1)
+    disc = np.stack([x, y], axis=1)[x * x + y * y <= n * n]
+    cells = np.floor(at / cell_m).astype(int) + disc - low
+    inside = ((cells >= 0) & (cells < images.shape[:0:-1])).all(axis=1)
+    known = ~np.isnan(images[0][cells[inside, 1], cells[inside, 0]])
+    return float(known.sum()) / len(disc)
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -247,18 +245,18 @@ class ChangeScore:
 
     listed, right  that the list has, and of these the true ones
     seen, told     true ones that are asked for and were seen, and of these those that the list has
-    off_m          of each right one, m from the true place
     doors          (listed as a door, of these truly one door before and after)
     moved          (listed as moved, of these truly one thing before and after)
+    off_m          of each right one, m from the true place
     """
 
     listed: int
     right: int
     seen: int
     told: int
+    doors: tuple[int, int]
+    moved: tuple[int, int]
     off_m: tuple[float, ...]
-    doors: tuple[int, int] = (0, 0)
-    moved: tuple[int, int] = (0, 0)
 
 
 def scored(changes: Sequence[Change], truth: Sequence[Spot]) -> ChangeScore:
@@ -279,9 +277,9 @@ def scored(changes: Sequence[Change], truth: Sequence[Spot]) -> ChangeScore:
         right=len(off),
         seen=len(seen),
         told=sum(t.at in told for t in seen),
-        off_m=tuple(off),
         doors=(len(named["door"]), sum(named["door"])),
         moved=(len(named["moved"]), sum(named["moved"])),
+        off_m=tuple(off),
     )
 
 
@@ -337,7 +335,7 @@ def _passed(sight: Sight, thing: Still) -> NDArray[np.bool_]:
     away = sight.points - sight.eye
     length = np.hypot(away[:, 0], away[:, 1])
     to = np.array(thing.middle()) - sight.eye
-    radius = thing.radius_m * (0.5 if is_door(thing.kind) else 1.0)
+    radius = 0.5 * thing.size_m
     with np.errstate(invalid="ignore", divide="ignore"):
         along = away @ to / length
         aside = np.abs(away[:, 0] * to[1] - away[:, 1] * to[0]) / length

@@ -15,7 +15,7 @@ from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
     from scripts.days.lifelong import Building
-    from scripts.days.sessions import Drive
+    from scripts.days.sessions import SessionDrive
     from sim.recording.recipe import Recipe
 
 
@@ -106,7 +106,9 @@ class Lifelong:
             )
         return first_s
 
-    def _live(self, names: list[str], drives: "Iterator[Drive]", about: dict[str, Any]) -> None:
+    def _live(
+        self, names: list[str], drives: "Iterator[SessionDrive]", about: dict[str, Any]
+    ) -> None:
         """Live it, write it, and say how it went."""
         from scripts.days import lifelong as life
         from scripts.days import tables
@@ -125,7 +127,7 @@ class Lifelong:
             (folder / "replays").mkdir()
             for building in buildings:
                 building.replays = folder / "replays"
-            kept: dict[int, Drive] = {}
+            kept: dict[int, SessionDrive] = {}
             with working("living through the sessions"):
                 rows, aged = life.lived(buildings, _noted(drives, kept))
             living = next((b for b in buildings if not b.anew), None)
@@ -171,7 +173,9 @@ def _sentence(building: "Building", rows: list[Row], aged: list[Row]) -> str:
     return sentences([of_building(of, rows, old, failure)])[0]
 
 
-def _noted(drives: "Iterator[Drive]", kept: "dict[int, Drive]") -> "Iterator[Drive]":
+def _noted(
+    drives: "Iterator[SessionDrive]", kept: "dict[int, SessionDrive]"
+) -> "Iterator[SessionDrive]":
     """The same, each also kept for the comparison of sessions."""
     for drive in drives:
         kept[drive.number] = drive
