@@ -20,6 +20,7 @@ from slam.errors import LogFormatError
 from slam.evaluation.statistics import median_interval, quantile, share_interval
 
 OUTCOMES = ("reached", "wrong", "given up", "failed")
+_KEY = ("scene", "dynamism", "slam")
 GOAL_COLUMNS = (
     *IDENTITY, "order", "goal", "outcome", "reason", "precision_m", "precision_rad", "time_s",
     "driven_m", "collisions", "by_robot", "by_others", "near_misses", "taken_by", "touched",
@@ -36,14 +37,9 @@ def goal_rows(run: DrivenRun) -> list[Row]:
     """A row for each goal."""
     rows = []
     for order, goal in enumerate(run.goals):
-        tally = goal["tally"]
-        rows.append({
-            **run.identity, **{k: goal[k] for k in GOAL_COLUMNS if k in goal}, "order": order,
-            "by_robot": tally["by_robot"], "by_others": tally["by_others"],
-            "collisions": tally["by_robot"] + tally["by_others"],
-            "near_misses": tally["near_misses"], "touched": " ".join(tally["touched"]),
-            "taken_by": goal["taken"],
-        })  # fmt: skip
+        row = {**run.identity, **goal, **goal["tally"], "order": order, "taken_by": goal["taken"]}
+        row["collisions"] = row["by_robot"] + row["by_others"]
+        rows.append(row | {"touched": " ".join(row["touched"])})
     return rows
 
 
@@ -52,11 +48,9 @@ def run_row(run: DrivenRun) -> Row:
     goals, offset = goal_rows(run), run.arrays["believed"] - run.arrays["true"]
     squared = offset[:, 0] * offset[:, 0] + offset[:, 1] * offset[:, 1]
     lost_s, found_s, (failure, words) = (run.rest[k] for k in ("lost_s", "found_s", "failure"))
-    counts = {o.replace(" ", "_"): sum(g["outcome"] == o for g in goals) for o in OUTCOMES}
     sums = ("time_s", "driven_m", "collisions", "by_robot", "by_others", "near_misses")
     return {
-        **run.identity, "goals": len(goals), **counts, "success": counts["reached"] / len(goals),
-        **_precisions(goals), **{name: sum(g[name] for g in goals) for name in sums},
+        **run.identity, **_outcomes(goals), **{name: sum(g[name] for g in goals) for name in sums},
         "ate_m": math.sqrt(float(squared.mean())) if len(squared) else None,
         "lost_s": lost_s, "recovered_s": found_s,
         "recovered": None if lost_s is None else int(found_s is not None),
@@ -65,14 +59,16 @@ def run_row(run: DrivenRun) -> Row:
     }  # fmt: skip
 
 
-def _precisions(goals: Sequence[Row]) -> Row:
+def _outcomes(goals: Sequence[Row]) -> Row:
+    """How many there are, of each outcome, the share reached, and how precisely."""
+    counts = {o.replace(" ", "_"): sum(g["outcome"] == o for g in goals) for o in OUTCOMES}
     arrived = [g for g in goals if g["precision_m"] is not None]
-    if not arrived:
-        return {"precision_m": None, "precision_rad": None}
-    return {
-        "precision_m": quantile([g["precision_m"] for g in arrived], 0.5),
-        "precision_rad": quantile([abs(g["precision_rad"]) for g in arrived], 0.5),
+    precisions = {
+        name: quantile([abs(g[name]) for g in arrived], 0.5) if arrived else None
+        for name in ("precision_m", "precision_rad")
     }
+    success = counts["reached"] / len(goals)
+    return {"goals": len(goals), **counts, "success": success, **precisions}
 
 
 def levels(goals: Sequence[Row], runs: Sequence[Row]) -> list[Row]:
@@ -81,24 +77,20 @@ def levels(goals: Sequence[Row], runs: Sequence[Row]) -> list[Row]:
     Success has Wilson's 95 % interval over the goals, the median precision over the goals believed
     reached a bootstrap interval.
     """
-    keys = ("scene", "dynamism", "slam")
-    by_key = grouped(goals, keys)
-    return [_level(key, by_key.get(key, []), own) for key, own in grouped(runs, keys).items()]
+    by_key, keys = grouped(goals, _KEY), grouped(runs, _KEY).items()
+    return [{**dict(zip(_KEY, k, strict=True)), **_level(by_key[k], own)} for k, own in keys]
 
 
-def _level(key: tuple[Any, ...], goals: list[Row], runs: list[Row]) -> Row:
-    counts = {o.replace(" ", "_"): sum(g["outcome"] == o for g in goals) for o in OUTCOMES}
-    low, high = share_interval(counts["reached"], len(goals))
+def _level(goals: list[Row], runs: list[Row]) -> Row:
+    reached = [g["time_s"] for g in goals if g["outcome"] == "reached"]
+    low, high = share_interval(len(reached), len(goals))
     arrived = [g["precision_m"] for g in goals if g["precision_m"] is not None]
     near, far = median_interval(arrived)
     km = sum(g["driven_m"] for g in goals) / 1e3
     return {
-        **dict(zip(("scene", "dynamism", "slam"), key, strict=True)),
-        "runs": len(runs), "goals": len(goals), **counts,
-        "success": counts["reached"] / len(goals), "success_low": low, "success_high": high,
+        **_outcomes(goals), "runs": len(runs), "success_low": low, "success_high": high,
         "given_up_taken": sum(g["outcome"] == "given up" and g["taken_by"] != "" for g in goals),
-        **_precisions(goals), "precision_m_low": near, "precision_m_high": far,
-        "time_s": quantile([g["time_s"] for g in goals if g["outcome"] == "reached"], 0.5),
+        "precision_m_low": near, "precision_m_high": far, "time_s": quantile(reached, 0.5),
         "collisions_per_km": sum(g["collisions"] for g in goals) / km if km else None,
         "near_misses_per_km": sum(g["near_misses"] for g in goals) / km if km else None,
         "runs_lost": sum(r["lost_s"] is not None for r in runs),
@@ -121,7 +113,7 @@ _COLUMNS: Columns = {
     "runs_lost": _COUNT, "runs_recovered": _COUNT,
 }  # fmt: skip
 TABLE = Table(
-    columns=_COLUMNS, key=("scene", "dynamism", "slam"),
+    columns=_COLUMNS, key=_KEY,
     parts=(
         *((outcome, "goals") for outcome in ("reached", "wrong", "given_up", "failed")),
         ("runs_lost", "runs"), ("runs_recovered", "runs_lost"),

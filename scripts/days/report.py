@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 from matplotlib.axes import Axes
 from matplotlib.figure import Figure
+from matplotlib.image import AxesImage
 from matplotlib.patches import Circle
 
 from scripts.console import plain_table
@@ -126,9 +127,7 @@ def _score(
     first, second = (drives[n].recording for n in numbers)
     if first is None or second is None or building.T_map_world is None:
         return None
-    snapshots: tuple[Snapshot, Snapshot] = (
-        building.snapshots[numbers[0]], building.snapshots[numbers[1]],
-    )  # fmt: skip
+    snapshots = building.snapshots[numbers[0]], building.snapshots[numbers[1]]
     truth = changed_spots(first, second, snapshots, cell_m, building.T_map_world)
     return scored(changes, truth)
 
@@ -180,17 +179,16 @@ LEAST = 0.05  # of the confidence of a change that is told
 SAME_M = 0.7  # two hinges so near are one door's
 
 
-def _draw(ax: Axes, snapshot: Snapshot, cell_m: float, title: str) -> None:
-    low, images = dense(snapshot.cells, snapshot.standing)
-    height, width = images[0].shape
-    x, y = (low * cell_m).tolist()
-    ax.set_facecolor(UNSEEN)
-    ax.imshow(
-        images[0], origin="lower", extent=(x, x + width * cell_m, y, y + height * cell_m),
-        cmap="Greys", vmin=0.0, vmax=1.0, interpolation="nearest",
+def _image(
+    ax: Axes, values: Any, corner: Sequence[float], cell_m: float, colours: str = "Greys"
+) -> AxesImage:
+    """Values in 0 to 1 by place, of which ``corner`` (x, y) m is the lowest."""
+    (x, y, *_), (height, width) = corner, values.shape
+    ax.set(facecolor=UNSEEN, xlabel="x, m")
+    return ax.imshow(
+        values, origin="lower", extent=(x, x + width * cell_m, y, y + height * cell_m),
+        cmap=colours, vmin=0.0, vmax=1.0, interpolation="nearest",
     )  # fmt: skip
-    ax.set_title(title)
-    ax.set_xlabel("x, m")
 
 
 def changes_picture(
@@ -205,7 +203,9 @@ def changes_picture(
         figure = Figure(figsize=(11.0, 4.6))
         axes = figure.subplots(1, 2, sharex=True, sharey=True)
         for ax, snapshot, title in zip(axes, snapshots, titles, strict=True):
-            _draw(ax, snapshot, cell_m, title)
+            low, images = dense(snapshot.cells, snapshot.standing)
+            _image(ax, images[0], (low * cell_m).tolist(), cell_m)
+            ax.set_title(title)
         for change in changes:
             colour, radius = COLOURS[change.kind], 0.5 * change.size_m + 0.15
             old = change.kind in ("gone", "door", "moved")
@@ -250,15 +250,10 @@ def mobility_picture(path: Path, mobility: MobilityMap, hours: Sequence[float]) 
         grid = figure.subplots(rows, 2, squeeze=False)
         for ax, (title, raster, colours) in zip(grid.ravel(), panes, strict=False):
             assert raster is not None
-            x, y, _ = raster.T_map_origin.tolist()
-            height, width = (n * raster.resolution_m for n in raster.values.shape)
-            ax.set_facecolor(UNSEEN)
-            drawn = ax.imshow(
-                raster.values, origin="lower", extent=(x, x + width, y, y + height),
-                cmap=colours, vmin=0.0, vmax=1.0, interpolation="nearest",
-            )  # fmt: skip
+            corner = raster.T_map_origin.tolist()
+            drawn = _image(ax, raster.values, corner, raster.resolution_m, colours)
             figure.colorbar(drawn, ax=ax, shrink=0.8)
-            ax.set(title=title, xlabel="x, m", ylabel="y, m")
+            ax.set(title=title, ylabel="y, m")
         for ax in grid.ravel()[len(panes) :]:
             ax.set_axis_off()
         save(figure, path)

@@ -10,13 +10,12 @@ from typing import Any
 from rich.markup import escape
 from rich.table import Table
 
-from scripts.comparison.tables import write_csv
+from scripts.comparison.tables import Row, write_csv
 from scripts.console import plain_table
 from scripts.days.lifelong import COLUMNS
 from scripts.days.truth import AGE_COLUMNS
 from slam.files import write_text
 
-Row = Mapping[str, Any]
 _FORMS = {
     "found_after_s": "{:.1f}", "rmse_m": "{:.3f}", "worst_m": "{:.3f}", "tracked": "{:.2f}",
     "disagrees": "{:.3f}", "outdated_told": "{:.2f}", "outdated_false": "{:.2f}",
@@ -28,11 +27,7 @@ _PRINTED = {
     "place": "place", "rmse_m": "rmse, m", "ghost_rate": "ghosts",
     "map_kb": "kB", "ms_per_scan": "ms",
 }  # fmt: skip
-_SHOWN = (
-    "session", "time_of_day", "map", "start", "found_after_s", "place", "rmse_m", "worst_m",
-    "outdated_told", "outdated_false", "ghost_rate", "ghost_seen_rate", "recall", "map_kb",
-    "load_s", "ms_per_scan",
-)  # fmt: skip
+_NOT_SHOWN = ("slam", "disagrees", "tracked", "memory_mb")
 
 _APART = re.compile(r".*\.apart([0-9]+)\.npz")  # of a session that did not fit
 
@@ -45,7 +40,8 @@ def words(column: str, value: object) -> str:
 def printed(slam: str, rows: Sequence[Row], *, whole: bool = False) -> Table:
     """One SLAM's sessions; ``whole``: with every column that a page has room for."""
     found = plain_table(slam)
-    shown = {column: column.replace("_", " ") for column in _SHOWN} if whole else _PRINTED
+    every = {column: column.replace("_", " ") for column in COLUMNS if column not in _NOT_SHOWN}
+    shown = every if whole else _PRINTED
     for heading in shown.values():
         found.add_column(heading, no_wrap=True)
     for row in rows:
