@@ -55,15 +55,15 @@ class DrivePlan(Asked):
                     yield dict(zip(IDENTITY, identity, strict=True)), self._job(level, seed, name)
 
     def _job(self, level: float, seed: int, name: str) -> Job:
-        room = self.levels_of.at(level) | options_with(self.crowd)
+        world = {"scene": self.scene, "seed": seed, "laser": self.scanner}
+        world |= self.levels_of.at(level) | options_with(self.crowd)
         goals = list(self.goals) if isinstance(self.goals, tuple) else self.goals
         run = Run(scene=self.scene, dynamism=level, seed=seed, axis=self.axis)
         return Job(
             name=f"{run.name}_{file_name(name)}",
             call=runs.run_one,
             arguments={
-                "scene": self.scene, "room": room, "seed": seed, "slam": name,
-                "goals": goals or None, "loop": asdict(self.loop), "laser": self.scanner,
+                "world": world, "slam": name, "goals": goals or None, "loop": asdict(self.loop),
             },
             code=code_of(runs.run_one, sim, scenes, slam, slam=name, scene=self.scene),
         )  # fmt: skip

@@ -17,22 +17,19 @@ from slam.errors import LogFormatError, SlamFailedError
 from slam.guests import Limits, limited
 
 
-def run_one(  # noqa: PLR0913 (the arguments of a job)
+def run_one(
     path: Path,
     *,
-    scene: str,
-    room: Mapping[str, Any],
-    seed: int,
+    world: Mapping[str, Any],
     slam: str,
     goals: list[str] | int | None,
     loop: Mapping[str, Any],
-    laser: str = "full",
 ) -> None:
     """A job: one run, into ``path``. A SLAM that cannot be made has failed at every goal.
 
-    room  dynamism, motion, change and crowd, as ``Simulation`` takes them
+    world  as ``Simulation`` takes it;   loop  as ``LoopConfig``
     """
-    simulation = Simulation(scene, seed=seed, laser=laser, **room)
+    simulation = Simulation(**world)
     try:
         system = limited(slam, Limits())
     except SlamFailedError as error:

@@ -9,6 +9,7 @@ from typing import Any
 from scripts.comparison.make import Beside, Tables
 from scripts.comparison.plan import Plan, running, simulating, simulator
 from scripts.comparison.schema import AGES, AGES_LEVELS
+from scripts.comparison.tables import Row
 from scripts.days import lifelong, scores
 from scripts.days.sessions import EVERY, checked_count
 from scripts.engine import Files, Stage, make
@@ -22,7 +23,7 @@ SESSIONS, LIVES = "sessions", "lives"  # folders
 FIRST = 3.0  # times as long as the others is the first session, which maps the building
 
 
-def identity(recipe: Recipe) -> dict[str, Any]:
+def identity(recipe: Recipe) -> Row:
     """The first columns of its rows: scene, motion, change, seed."""
     motion = recipe.dynamism if recipe.motion is None else recipe.motion
     return {
@@ -106,7 +107,7 @@ class Buildings:
             Stage(title="living in buildings", folder=str(Path(folder, LIVES)), jobs=lives),
         )
 
-    def rows(self, done: Files) -> list[dict[str, Any]]:
+    def rows(self, done: Files) -> list[Row]:
         """A row (``scores.COLUMNS``) for each SLAM and building."""
         rows = []
         for recipe, slam, job in self.lives():
@@ -133,7 +134,7 @@ def of_comparison(plan: Plan) -> Buildings | None:
 DAYS = "days"  # folder of what buildings take, within a comparison or a benchmark
 
 
-def carry_out(buildings: Buildings, out: Path, **ways: Any) -> list[dict[str, Any]]:
+def carry_out(buildings: Buildings, out: Path, **ways: Any) -> list[Row]:
     """Make what is missing in ``out``, as ``scripts.engine.make`` does; ``Buildings.rows``."""
     return buildings.rows(make(buildings.stages(), out, **ways))
 

@@ -12,7 +12,6 @@ import shutil
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -21,6 +20,7 @@ from scenes.kinds import is_door
 from scripts.comparison.maps import Sight
 from scripts.comparison.recording import Recording
 from scripts.comparison.schema import OLD as AGES
+from scripts.comparison.tables import Row
 from slam import se2
 from slam.days.changes import Change
 from slam.days.evidence import Snapshot
@@ -343,7 +343,7 @@ def _passed(sight: Sight, thing: Still) -> NDArray[np.bool_]:
     return np.asarray(met, dtype=np.bool_)
 
 
-def verdicts(estimates: Sequence[Estimate], shares: Float, first: int) -> dict[str, Any]:
+def verdicts(estimates: Sequence[Estimate], shares: Float, first: int) -> Row:
     """From scan ``first`` on: how often "map outdated here" is said where the room clearly changed,
     and where it hardly did; None without such scans.
     """

@@ -19,22 +19,30 @@ SCHEMA = 1
 WARM_UP = 5  # the first scans may compile; they are left out of the timings
 
 
-def results(replay: Replay, wall_s: float, machine: Mapping[str, Any]) -> dict[str, Any]:
+def results(
+    replay: Replay, wall_s: float, machine: Mapping[str, Any], kept: KeptScans
+) -> dict[str, Any]:
     """What ``results.json`` holds: a block of numbers for each SLAM, and where it was measured.
 
     Errors are of the online poses; ``..._final`` those of the final trajectory where a system has
-    one of its own. Without truth only the timings are there.
+    one of its own. Without truth only the timings are there, and how well the poses agree with
+    each other, where scans were ``kept`` to say it.
     """
     truth = replay.truth()
     stamps = [e.stamp_ns for track in replay.tracks.values() for e in track.estimates]
     duration_s = (max(stamps) - min(stamps)) / 1e9 if stamps else 0.0
+    blocks = {name: scores(track, truth, duration_s) for name, track in replay.tracks.items()}
+    for name, track in replay.tracks.items():
+        found = kept.judged((track.final() or track.online()).poses)
+        if found is not None:
+            blocks[name]["consistency"] = found.block()
     return {
         "schema": SCHEMA,
         "duration_s": duration_s,
         "distance_m": truth.length_m() if truth is not None else None,
         "wall_s": wall_s,
         "machine": dict(machine),
-        "slams": {name: scores(track, truth, duration_s) for name, track in replay.tracks.items()},
+        "slams": blocks,
     }
 
 
@@ -55,18 +63,8 @@ def scores(track: Track, truth: Trajectory | None, duration_s: float) -> dict[st
     return block
 
 
-def agreeing(replay: Replay, kept: KeptScans) -> dict[str, dict[str, float | int | None]]:
-    """How well each SLAM's poses agree with each other, where there are scans to say it."""
-    out = {}
-    for name, track in replay.tracks.items():
-        found = kept.judged((track.final() or track.online()).poses)
-        if found is not None:
-            out[name] = found.block()
-    return out
-
-
 def agreement_words(outcome: Mapping[str, Any]) -> str:
-    """The same in a sentence; "" for none."""
+    """How well each SLAM's poses agree with each other, in a sentence; "" where nobody can say."""
     parts = []
     for name, block in outcome["slams"].items():
         found = block.get("consistency")

@@ -8,7 +8,7 @@ import resource
 import sys
 import time
 from collections.abc import Callable, Mapping
-from contextlib import nullcontext
+from contextlib import ExitStack
 from dataclasses import dataclass, field
 from pathlib import Path
 from typing import Any
@@ -135,41 +135,29 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
 
     The folder appears when it is whole. Returns what ``results.json`` holds.
     """
-    replay, before_s = show.replay, _spent_s()
+    before_s, settings = _spent_s(), outputs.settings
     if outputs.film:
         require_ffmpeg()
     with whole_folder(
-        outputs.folder,
-        overwrite=outputs.overwrite,
-        command=outputs.command,
-        settings=outputs.settings,
+        outputs.folder, overwrite=outputs.overwrite, command=outputs.command, settings=settings
     ) as folder:
-        show.pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
-        pace, path = show.pace, folder / "film.mp4"
-        reel = film(path, pace.fps, preset=pace.preset) if outputs.film else nullcontext()
-        recorder = Recorder.of(folder / "replay.html", show) if outputs.film else nullcontext()
-        liveliest, started = Liveliest(show.duration_s / 3.0), time.perf_counter()
-        with reel as opened, recorder as recording:
-            kept = KeptScans()
-            for frame in watched(shoot(stream, show, opened), stream, show.title):
-                kept.note(frame, show.track().estimates[-1].T_map_robot)
-                if recording is not None and opened is not None and show.shown is not None:
-                    liveliest.note(frame, show.shown.seconds, opened.last)
-                    recording.note(show.shown)
+        started = time.perf_counter()
+        played = _play(folder, stream, show, outputs)
         wall_s = time.perf_counter() - started
         with working("closing loops, scoring"):
-            results = _scored(replay, wall_s, kept)
+            results = score.results(show.replay, wall_s, machine(), played.kept)
         with working("writing map and paths"):
-            _write_paths(folder, replay, int(stream.metadata.extra.get(EPOCH, 0)))
+            _write_paths(folder, show.replay, int(stream.metadata.extra.get(EPOCH, 0)))
             in_pictures = _write_map(folder, show)
         with working("drawing map, paths and errors"):
             _draw(folder, show, in_pictures)
-            if opened is not None and opened.last is not None:
-                poster = _poster(show, in_pictures, opened.last, liveliest.picture)
+            if played.last is not None:
+                framed = None if in_pictures is None else show.poster(in_pictures.map)
+                poster = next(p for p in (framed, played.liveliest, played.last) if p is not None)
                 imageio.imwrite(folder / "poster.png", poster)
         for name, write in _files.items():
             write(folder / name, show)
-        results["cost"] = cost = _cost(replay, _spent_s() - before_s)
+        results["cost"] = cost = _cost(show.replay, _spent_s() - before_s)
         write_text(folder / "results.json", json.dumps(results, indent=2, sort_keys=True) + "\n")
         write_recipe(folder, outputs.command, outputs.settings)
         table = score.table(results, show.title)
@@ -186,6 +174,33 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
     return results
 
 
+@dataclass(frozen=True, eq=False)
+class Played:
+    """What was kept on the way: scans, and of a film its last picture and that of its liveliest
+    second."""
+
+    kept: KeptScans
+    last: Picture | None = None
+    liveliest: Picture | None = None
+
+
+def _play(folder: Path, stream: Stream, show: Show, outputs: Outputs) -> Played:
+    """Run through the stream; film and record it where that is wanted."""
+    show.pace = pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
+    kept, liveliest = KeptScans(), Liveliest(show.duration_s / 3.0)
+    with ExitStack() as stack:
+        reel = recording = None
+        if outputs.film:
+            reel = stack.enter_context(film(folder / "film.mp4", pace.fps, preset=pace.preset))
+            recording = stack.enter_context(Recorder.of(folder / "replay.html", show))
+        for frame in watched(shoot(stream, show, reel), stream, show.title):
+            kept.note(frame, show.track().estimates[-1].T_map_robot)
+            if recording is not None and reel is not None and show.shown is not None:
+                liveliest.note(frame, show.shown.seconds, reel.last)
+                recording.note(show.shown)
+    return Played(kept, None if reel is None else reel.last, liveliest.picture)
+
+
 def _cost(replay: Replay, spent_s: float) -> dict[str, Any]:
     """For ``results.json``: s of processor time of all updates and of all else, and MB."""
     updates_s = (s for track in replay.tracks.values() for s in track.durations_s)
@@ -199,21 +214,6 @@ def _spent_s() -> float:
     """s of this process and of those that it started and that have ended."""
     times = os.times()
     return times.user + times.system + times.children_user + times.children_system
-
-
-def _poster(show: Show, drawn: Drawn | None, last: Picture, liveliest: Picture | None) -> Picture:
-    """A log's map in its frame; of a room the liveliest second, or the last."""
-    framed = None if drawn is None else show.poster(drawn.map)
-    if framed is not None:
-        return framed
-    return last if liveliest is None else liveliest
-
-
-def _scored(replay: Replay, wall_s: float, kept: KeptScans) -> dict[str, Any]:
-    results = score.results(replay, wall_s, machine())
-    for name, found in score.agreeing(replay, kept).items():
-        results["slams"][name]["consistency"] = found
-    return results
 
 
 def _write_paths(folder: Path, replay: Replay, epoch_ns: int) -> None:

@@ -129,7 +129,8 @@ def test_recipes_of_one_axis_hold_the_other_at_0():
     ((identity, job),) = drive.jobs()
     assert identity["dynamism"] == 0.5
     assert job.name.startswith("arena_c0.5_")
-    assert job.arguments["room"] == {
+    world = {"scene": "arena", "seed": 1, "laser": "full"}
+    assert job.arguments["world"] == world | {
         "dynamism": 0.0, "motion": None, "change": 0.5, "crowd": "escorts:2"
     }  # fmt: skip
     for plan_of in (Plan, DrivePlan):

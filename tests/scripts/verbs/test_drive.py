@@ -64,9 +64,9 @@ def test_seeds_are_a_number_or_a_list():
 def test_a_slam_that_cannot_be_made_has_failed_at_every_goal(tmp_path, monkeypatch):
     (tmp_path / "stillborn.py").write_text("class Slam:\n    def __init__(self): 1 / 0\n")
     monkeypatch.syspath_prepend(tmp_path)
-    who = {"scene": "arena", "room": {"dynamism": 0.0}, "seed": 100, "slam": "stillborn:Slam"}
-    run_one(tmp_path / "run.npz", **who, goals=2, loop={})
-    run = load(tmp_path / "run.npz", {**who, "dynamism": 0.0})
+    world = {"scene": "arena", "dynamism": 0.0, "seed": 100}
+    run_one(tmp_path / "run.npz", world=world, slam="stillborn:Slam", goals=2, loop={})
+    run = load(tmp_path / "run.npz", {**world, "slam": "stillborn:Slam"})
     rows = tables.goal_rows(run)
     assert [(row["outcome"], row["reason"]) for row in rows] == [("failed", "raised")] * 2
     row = tables.run_row(run)
