@@ -15,7 +15,6 @@ from scripts.output import (
     READY,
     check_whole,
     locked_folder,
-    put_tables,
     result_folder,
     together,
     write_recipe,
@@ -62,28 +61,21 @@ def test_to_overwrite_is_no_advice_for_another_result(tmp_path: Path):
 
 
 @pytest.mark.parametrize(
-    ("words", "is_folder", "name"),
+    ("words", "name"),
     [
-        ("office-d0.5-s0001", True, "office-d0.5-s0001"),
-        ("office-d0.5-s0002", True, "office-d0.5-s0002"),
-        ("intel.log.xz", False, "intel"),
-        ("runs/arena-d0.5-s0100.npz", False, "arena-d0.5-s0100"),
-        ("lab.v2.bag", False, "lab.v2"),
-        ("recorded.mcap", False, "recorded"),
+        ("office-d0.5-s0001/", "office-d0.5-s0001"),
+        ("one/office-d0.5-s0001/", "one-office-d0.5-s0001"),  # of a dataset
+        ("intel.log.xz", "intel"),
+        ("runs/arena-d0.5-s0100.npz", "arena-d0.5-s0100"),
+        ("lab.v2.bag", "lab.v2"),
+        ("recorded.mcap", "recorded"),
     ],
 )
-def test_outputs_keep_the_whole_name_of_an_episode(words, is_folder, name, tmp_path: Path):
-    if is_folder:
-        (tmp_path / words).mkdir()
+def test_outputs_keep_the_whole_name_of_an_episode(words, name, tmp_path: Path):
+    if words.endswith("/"):
+        (tmp_path / words).mkdir(parents=True)
+    write_text(tmp_path / "one" / PLAN, "{}")
     assert run_name(tmp_path / words) == name
-
-
-def test_equally_named_episodes_of_two_datasets_have_outputs_of_their_own(tmp_path: Path):
-    for data in ("one", "two"):
-        (tmp_path / data / "office-d0.5-s0001").mkdir(parents=True)
-        (tmp_path / data / PLAN).write_text("{}")
-    names = {run_name(tmp_path / data / "office-d0.5-s0001") for data in ("one", "two")}
-    assert names == {"one-office-d0.5-s0001", "two-office-d0.5-s0001"}
 
 
 def test_somebody_elses_files_are_never_replaced(tmp_path: Path):
@@ -158,7 +150,7 @@ def refuse(*_words: object, **_more: object) -> None:
     raise OSError(95, "Operation not supported")
 
 
-def test_a_file_of_theirs_under_a_name_of_ours_is_kept_under_another(tmp_path: Path, capsys):
+def test_what_of_theirs_bears_a_name_of_ours_is_kept_under_another(tmp_path: Path, capsys):
     run = tmp_path / "run"
     make(run, "one")
     for name in ("data.txt", "data.txt.old"):
@@ -167,23 +159,13 @@ def test_a_file_of_theirs_under_a_name_of_ours_is_kept_under_another(tmp_path: P
         line for line in (run / SUMS).read_text().splitlines(True) if "data" not in line
     ))  # fmt: skip
     make(run, "two", overwrite=True)
-    assert contents(run) == {
-        "data.txt": "two", "data.txt.old": "my data.txt", "data.txt.old.old": "my data.txt.old",
-        "recipe.json": (run / "recipe.json").read_text(),
-    }  # fmt: skip
     assert "write: data.txt.old, data.txt.old.old" in capsys.readouterr().out
-
-
-def test_a_folder_of_theirs_under_the_name_of_a_file_of_ours_is_kept_under_another(tmp_path: Path):
-    run = tmp_path / "run"
-    make(run, "one")
     (run / "data.txt").unlink()
-    for name in ("data.txt/a/b", "data.txt/c", "data.txt.old"):
-        write_text(run / name, f"my {name}")
-    make(run, "two", overwrite=True)
+    write_text(run / "data.txt/a/b", "in my folder")
+    make(run, "three", overwrite=True)
     assert contents(run) == {
-        "data.txt": "two", "data.txt.old": "my data.txt.old", "data.txt.old.old/a/b":
-        "my data.txt/a/b", "data.txt.old.old/c": "my data.txt/c",
+        "data.txt": "three", "data.txt.old": "my data.txt", "data.txt.old.old": "my data.txt.old",
+        "data.txt.old.old.old/a/b": "in my folder",
         "recipe.json": (run / "recipe.json").read_text(),
     }  # fmt: skip
 
@@ -260,35 +242,8 @@ def test_tables_appear_together_or_not_at_all(tmp_path: Path):
     assert contents(tmp_path) == {"a.csv": "new", "runs/b.csv": "new", "mine.txt": "mine"}
 
 
-def test_tables_stopped_on_the_way_are_refused_and_then_finished(tmp_path: Path, monkeypatch):
-    tables(tmp_path, "old")
-    replace, calls = os.replace, []
-
-    def cut(one, two):
-        calls.append(two)
-        if len(calls) == 7:  # three files in the staging folder, that folder, two in their places
-            raise KeyboardInterrupt
-        replace(one, two)
-
-    monkeypatch.setattr("os.replace", cut)
-    with pytest.raises(KeyboardInterrupt):
-        tables(tmp_path, "new")
-    monkeypatch.undo()
-    assert contents(tmp_path) == {
-        "a.csv": "new", ".tables.ready/runs/b.csv": "new", "runs/b.csv": "old",
-    }  # fmt: skip
-    for reader in (check_whole, compared.read, driven):
-        with pytest.raises(LogFormatError, match=r"unfinished, .*: the same command again goes on"):
-            reader(tmp_path)
-    with pytest.raises(LogFormatError, match="unfinished"):
-        run_of(tmp_path / "runs" / "b.npz")
-    put_tables(tmp_path)
-    check_whole(tmp_path)
-    assert contents(tmp_path) == {"a.csv": "new", "runs/b.csv": "new"}
-
-
 @pytest.mark.parametrize("moved", range(4))
-def test_the_same_command_goes_on_wherever_its_tables_were_stopped(
+def test_tables_stopped_on_the_way_are_refused_until_the_same_command_goes_on(
     tmp_path: Path, monkeypatch, moved: int
 ):
     def grown(text: str) -> None:
@@ -310,9 +265,13 @@ def test_the_same_command_goes_on_wherever_its_tables_were_stopped(
     with pytest.raises(KeyboardInterrupt):
         grown("new")
     monkeypatch.undo()
+    for reader in (check_whole, compared.read, driven, lambda out: run_of(out / "runs" / "b.npz")):
+        with pytest.raises(LogFormatError, match=r"unfinished, .*: the same command again goes on"):
+            reader(tmp_path / "out")
     grown("new")
+    check_whole(tmp_path / "out")
     assert set(contents(tmp_path / "out")) == {"a.csv", "runs/b.csv", "recipe.json"}
-    assert contents(tmp_path / "out")["a.csv"] == "new"
+    assert contents(tmp_path / "out")["a.csv"] == contents(tmp_path / "out")["runs/b.csv"] == "new"
 
 
 @pytest.mark.parametrize("failure", [OSError(28, "No space left on device"), KeyboardInterrupt()])
