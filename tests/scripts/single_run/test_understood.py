@@ -12,7 +12,7 @@ import pytest
 import tests.slam.logs.foreign_bags as bags
 from scripts import cli
 from scripts.film.footage import Footage, of_log
-from scripts.single_run import run
+from scripts.single_run import log_words
 from slam.errors import InvalidValueError
 from tests.world2d import World2D, frames, laser, office, office_loop
 
@@ -50,7 +50,7 @@ def without(bag: Any) -> Path:
 
 
 def said(footage: Footage, capsys: pytest.CaptureFixture[str], caplog: Any) -> tuple[str, str]:
-    run.tell(footage, strict=False)
+    log_words.tell(footage, strict=False)
     return capsys.readouterr().out.strip(), caplog.text
 
 
@@ -74,24 +74,24 @@ def test_a_scanner_mounted_backwards_without_transform_is_named_with_its_flag(
     assert "agree under --laser 0,0,180 (" in warned
     assert "more than 1000 to 1" in warned
     with pytest.raises(InvalidValueError, match="refused by --strict"):
-        run.tell(of_log(without), strict=True)
+        log_words.tell(of_log(without), strict=True)
 
 
 def test_with_the_flag_that_was_asked_for_all_is_well(
     without: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
-    footage = of_log(without, mount=run.mount_of("0.1,0,180"))
+    footage = of_log(without, mount=log_words.mount_of("0.1,0,180"))
     line, warned = said(footage, capsys, caplog)
     assert "turned 180° on the robot, by --laser" in line
     assert warned == ""
-    flipped = said(of_log(without, mount=run.mount_of("0 0 180"), flip=True), capsys, caplog)
+    flipped = said(of_log(without, mount=log_words.mount_of("0 0 180"), flip=True), capsys, caplog)
     assert "agree under --laser 0,0,180 --flip (" in flipped[1]
 
 
 @pytest.mark.parametrize("text", ["", "1,2", "1,2,3,4", "a,b,c"])
 def test_what_is_no_place_is_refused(text: str) -> None:
     with pytest.raises(InvalidValueError, match="--laser must be x,y,yaw_deg"):
-        run.mount_of(text)
+        log_words.mount_of(text)
 
 
 def test_a_run_that_nobody_trusts_names_the_likeliest_cause_first(without: Path) -> None:
@@ -103,21 +103,23 @@ def test_a_run_that_nobody_trusts_names_the_likeliest_cause_first(without: Path)
         estimates = [SimpleNamespace(converged=k >= doubted) for k in range(10)]
         return SimpleNamespace(name="mine", estimates=estimates)
 
-    assert run.distrust(track(3), footage, found) == ""
-    words = run.distrust(track(4), footage, found)
+    assert log_words.distrust(track(3), footage, found) == ""
+    words = log_words.distrust(track(4), footage, found)
     assert words.startswith("mine did not trust 40% of its scans. Likely causes, in order: the sc")
     assert np.all([word in words for word in ("different clocks", "wheels that slip")])
     footage.empty = 0.5
-    assert "50% of the scans return less than 10 % of beams" in run.distrust(track(4), footage, [])
+    assert "50% of the scans return less than 10 % of beams" in log_words.distrust(
+        track(4), footage, []
+    )
 
 
 def test_a_strict_run_that_nobody_trusts_ends_with_its_own_status(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:
     def untrusted() -> None:
-        raise run.UntrustedRunError("mine did not trust 40% of its scans")
+        raise log_words.UntrustedRunError("mine did not trust 40% of its scans")
 
     monkeypatch.setattr(cli, "app", untrusted)
     with pytest.raises(SystemExit) as ended:
         cli.main()
-    assert ended.value.code == run.UNTRUSTED_STATUS == 6
+    assert ended.value.code == log_words.UNTRUSTED_STATUS == 6
