@@ -1,11 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """Is what a verb left still what it left: a dataset, an episode, a run, a comparison, a map."""
 
-import json
 import os
 from collections.abc import Callable
+from contextlib import suppress
 from pathlib import Path
-from typing import Any
 
 from scripts.benchmark import submission
 from scripts.closed_loop import tables as closed_loop
@@ -13,11 +12,11 @@ from scripts.comparison import folder as compared
 from scripts.comparison import schema
 from scripts.comparison.run_file import RunFile
 from scripts.names import file_name, is_run
-from scripts.output import MAX_RECIPE_BYTES, RECIPE, read_recipe_words
+from scripts.output import MAX_RECIPE_BYTES, RECIPE, read_recipe_words, slams_of
 from sim.recording.dataset import PLAN, check_dataset
 from sim.recording.sums import SUMS, Fault, check_vouched, faults
 from sim.recording.verify import METADATA, Finding, check_hashes, finding, listed_in
-from slam.bounded import check_file
+from slam.bounded import json_of
 from slam.errors import LogFormatError, MissingPathError
 from slam.maps import has_sums, read_map
 from slam.tracker import map_file as memory
@@ -105,24 +104,18 @@ def _unreadable(folder: Path) -> list[Fault]:
 def _wanted(folder: Path) -> list[str]:
     """What must be in it, as far as its recipe and its table can be read."""
     names = [RECIPE]
-    try:
-        check_file(folder / RECIPE)
-        with (folder / RECIPE).open("rb") as file:
-            recipe: Any = json.loads(file.read(MAX_RECIPE_BYTES))
-        command = str(recipe["command"])
+    with suppress(LogFormatError):  # damaged, which its hash says
+        recipe = json_of(folder / RECIPE, MAX_RECIPE_BYTES, "recipe", strict=False)
+        command, settings = str(recipe.get("command")), recipe.get("settings")
         names += _ALWAYS.get(command, ())
-        if command in ("run", "demo"):
-            slams = recipe["settings"].get("slams", [])
-            names += [f"trajectory_{file_name(str(slam))}.tum" for slam in slams]
+        if command in ("run", "demo") and isinstance(settings, dict):
+            slams = slams_of(folder / RECIPE, settings)
+            names += [f"trajectory_{file_name(slam)}.tum" for slam in slams]
         if command == "compare":
             made = compared.read(folder)
             names += [f"runs/{name}.npz" for name in made.names()]
             if made.settings.get("sessions") is not None:
                 names += [schema.AGES, schema.AGES_LEVELS]
-    except (OSError, ValueError, TypeError, KeyError, AttributeError, RecursionError):
-        return [RECIPE]  # damaged, which its hash says
-    except LogFormatError:  # the same
-        return names
     return sorted(names)
 
 

@@ -237,11 +237,15 @@ def _trial(found: Inquest, checkpoint: Checkpoint, kind: str, change: Change) ->
         strip = checkpoint.rerun(change, found.last)
     except SlamFailedError as error:
         return Trial(change=change, kind=kind, failed=str(error))
-    rise = _rise_m(found, strip)
-    path_m, others_m = _aside(found, change, strip)
+    rise, tape = _rise_m(found, strip), found.tape
+    path = np.array(strip.truth) - np.array(tape.strip.truth[found.first : found.last + 1])
+    changed = (*change.out, *change.frozen)
+    others = [m for m, name in enumerate(tape.names) if name not in changed]
+    gap: Float = strip.poses[-1][others] - tape.strip.poses[found.last][others]
     return Trial(
         change=change, kind=kind, rise_m=rise, share=1.0 - rise / found.rise_m,
-        cured=rise < CURED * found.rise_m, path_m=path_m, others_m=others_m, strip=strip,
+        cured=rise < CURED * found.rise_m, path_m=_longest(path), others_m=_longest(gap),
+        strip=strip,
     )  # fmt: skip
 
 
@@ -263,17 +267,6 @@ def _rise_m(found: Inquest, strip: Strip) -> float:
     return float(np.median(errors[late]))
 
 
-def _aside(found: Inquest, change: Change, strip: Strip) -> tuple[float, float]:
-    """What else is different: the robot's path and the others' places, m."""
-    tape = found.tape
-    path = np.array(strip.truth) - np.array(tape.strip.cut(found.first, found.last).truth)
-    changed = (*change.out, *change.frozen)
-    others = [m for m, name in enumerate(tape.names) if name not in changed]
-    gap: Float = strip.poses[-1][others] - tape.strip.poses[found.last][others]
-    return _longest(path), _longest(gap)
-
-
 def _longest(ways: Float) -> float:
-    if not len(ways):
-        return 0.0
-    return float(np.sqrt(ways[:, 0] * ways[:, 0] + ways[:, 1] * ways[:, 1]).max())
+    """m, 0 of none."""
+    return float(np.sqrt(ways[:, 0] * ways[:, 0] + ways[:, 1] * ways[:, 1]).max(initial=0.0))

@@ -159,11 +159,8 @@ class _Camera:
         x, y, yaw = pose.tolist()
         radius = self._radii[m] + 0.12
         if is_door(self._tape.kinds[m]):
-            radius = 0.5 * self._radii[m] + 0.1
-            x, y = (
-                x + 0.5 * self._radii[m] * math.cos(yaw),
-                y + 0.5 * self._radii[m] * math.sin(yaw),
-            )
+            half = 0.5 * self._radii[m]
+            radius, x, y = half + 0.1, x + half * math.cos(yaw), y + half * math.sin(yaw)
         ring = Circle((x, y), radius, fill=False, color=CULPRIT, lw=1.5, ls=":" if gone else "-")
         ax.add_patch(ring)
         if label:

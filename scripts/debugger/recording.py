@@ -101,9 +101,8 @@ def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> 
         every = found.every
         recorded = RunFile(folder).believed(slam).poses if slam in found.slams else None
     elif found.made is None:
-        online = (
-            folder if folder.is_dir() else folder.parent
-        ) / f"trajectory_{file_name(slam)}.tum"
+        home = folder if folder.is_dir() else folder.parent
+        online = home / f"trajectory_{file_name(slam)}.tum"
         check_vouched(online)
         recorded = read_tum(online).poses if every == 1 and online.exists() else None
     return Case(

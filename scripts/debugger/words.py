@@ -40,24 +40,14 @@ def headline(found: Inquest) -> tuple[str, str]:
         return f"Nothing to explain {at}", f"{up}: less than a re-run could be told by."
     sure = f"{up}; with other noise again in {found.recurs} of {question.repeats}."
     if verdict in ("culprit", "several"):
-        return _named(found) + (
-            "" if found.firm else ", weakly"
-        ), f"{sure} Cured in {found.named[0].again} of {question.repeats}."
+        return _named(found) + ("" if found.firm else ", weakly"), sure + _cured(found)
     if verdict == "undecided":
-        why = (
-            "with other noise it does not happen"
-            if found.rare
-            else "no cure works with other noise"
-        )
-        return f"Undecided: {why}", sure + _tries(found)
+        never, no_cure = "with other noise it does not happen", "no cure works with other noise"
+        return f"Undecided: {never if found.rare else no_cure}", sure + _tries(found)
     if verdict == "joint":
-        together = found.named[0]
         singles = any(trial.kind == "single" for trial in found.trials)
         alone = "nobody alone, but " if singles else ""
-        return (
-            f"Joint: {alone}{who(together)} cures it",
-            f"{sure} Cured in {together.again} of {question.repeats}.",
-        )
+        return f"Joint: {alone}{who(found.named[0])} cures it", sure + _cured(found)
     why = "sensor, geometry or odometry"
     return f"Not the movers: {why}", sure + " It also happens with all movers out and all frozen."
 
@@ -71,6 +61,10 @@ def _named(found: Inquest) -> str:
     still = any(t.cured and t.change.frozen == (names[0],) for t in found.trials)
     motion = "its motion" if still else "its presence"
     return f"Culprit: {names[0]}, {motion} ({100.0 * min(best.share, 1.0):.0f} % of the error gone)"
+
+
+def _cured(found: Inquest) -> str:
+    return f" Cured in {found.named[0].again} of {found.question.repeats}."
 
 
 def _tries(found: Inquest) -> str:
@@ -101,15 +95,10 @@ def table(found: Inquest) -> Table:
     ):
         names = trial.change.out or trial.change.frozen
         sighting = seen.get(names[0]) if trial.kind == "single" else None
-        shown.add_row(
-            escape(who(trial)),
-            str(sighting.beams) if sighting else "",
-            f"{sighting.moved_m:.2f}" if sighting else "",
-            "failed" if trial.failed else f"{trial.rise_m:.2f}",
-            "" if trial.failed else f"{100.0 * trial.share:.0f} %",
-            "" if trial.failed else f"{trial.others_m:.2f}",
-            _word(found, trial),
-        )
+        seen_as = (str(sighting.beams), f"{sighting.moved_m:.2f}") if sighting else ("", "")
+        told = f"{trial.rise_m:.2f}", f"{100.0 * trial.share:.0f} %", f"{trial.others_m:.2f}"
+        cells = ("failed", "", "") if trial.failed else told
+        shown.add_row(escape(who(trial)), *seen_as, *cells, _word(found, trial))
     return shown
 
 
