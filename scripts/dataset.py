@@ -88,16 +88,13 @@ def summary(dataset: Dataset, made: int, spent_s: float) -> Table:
 
 def _row(folders: list[Path]) -> list[str]:
     results: list[Any] = [read_recipe(folder / RECIPE).result for folder in folders]
-    returns = {
-        name: sum(int(result["returns"][name]) for result in results)
-        for name in ("moving", "semi_static", "static")
-    }
-    beams = max(sum(returns.values()), 1)
+    kinds = ("moving", "semi_static", "static")
+    returns = [sum(int(result["returns"][kind]) for result in results) for kind in kinds]
     size = sum(file.stat().st_size for folder in folders for file in folder.iterdir())
     return [
         str(len(folders)),
         str(sum(int(result["frames"]) for result in results)),
         f"{sum(float(result['distance_m']) for result in results):.1f}",
-        *(f"{100.0 * count / beams:.1f} %" for count in returns.values()),
+        *(f"{100.0 * count / max(sum(returns), 1):.1f} %" for count in returns),
         f"{size / 1e6:.1f}",
     ]

@@ -148,22 +148,16 @@ def _make_missing(
     files = {name: folder / job.file_name() for name, job in wanted.items()}
     missing = [job for name, job in wanted.items() if not _whole(files[name])]
     with progress() as bar:
-        done = len(wanted) - len(missing)
-        task = bar.add_task(escape(title), total=len(wanted), completed=done, before=done, unit="")
-
-        def advance() -> None:
-            bar.advance(task)
-            bar.update(task, unit=f"{int(bar.tasks[0].completed)}/{len(wanted)}")
-
+        total, there = len(wanted), len(wanted) - len(missing)
+        task = bar.add_task(escape(title), total=total, completed=there, before=there, unit="")
         pairs = [(job, files[job.name]) for job in missing]
+        ways: dict[str, Any] = {"jobs": processes, "cluster": cluster, "shared": folder}
         spent = []
         try:
-            for one in workers.each(
-                _make_pair, pairs, jobs=processes, cluster=cluster, shared=folder
-            ):
+            for done, one in enumerate(workers.each(_make_pair, pairs, **ways), there + 1):
                 spent.append(one)
                 interrupt.check()
-                advance()
+                bar.update(task, completed=done, unit=f"{done}/{total}")
         finally:
             if spent and cluster is None:
                 learn(spent)

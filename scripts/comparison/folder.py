@@ -91,11 +91,9 @@ class Compared:
         own = self.settings
         wanted = math.prod(len(own[name]) for name in ("scenes", "levels", "seeds", "slams"))
         if len(rows) != wanted:  # known and no two the same: as many as there are is all
-            raise LogFormatError(
-                self.folder / RUNS,
-                f"must have {wanted} rows, one for each scene, level, seed and SLAM of the recipe, "
-                f"got {len(rows)}",
-            )
+            each = "one for each scene, level, seed and SLAM of the recipe"
+            said = f"must have {wanted} rows, {each}, got {len(rows)}"
+            raise LogFormatError(self.folder / RUNS, said)
         return rows
 
     @cached_property
@@ -127,17 +125,15 @@ class Compared:
         rows = read_csv(path, TABLES[name], self.axis, vouched=self.vouched)
         if not rows and name != PAIRED:
             raise LogFormatError(path, "a table without rows")
-        known = {column: set(self.settings[named]) for column, named in _NAMED.items()}
+        known = {column: {*self.settings[setting]} for column, setting in _NAMED.items()}
         for number, row in enumerate(rows, 1):
             for column, values in known.items():
                 # Seeds of buildings are those of the runs; a building has no level.
                 if column in row and row[column] not in values:
                     named = self.axis if column == "dynamism" else column
-                    raise LogFormatError(
-                        path,
-                        f"row {number}: column {named!r} must be one of settings.{_NAMED[column]} "
-                        f"of the recipe, got {row[column]!r:.80}",
-                    )
+                    wanted = f"must be one of settings.{_NAMED[column]} of the recipe"
+                    said = f"row {number}: column {named!r} {wanted}, got {row[column]!r:.80}"
+                    raise LogFormatError(path, said)
         return rows
 
     def names(self) -> list[str]:
@@ -150,8 +146,7 @@ class Compared:
 
     def run(self, scene: str, dynamism: float, seed: int) -> RunFile:
         """One simulated run with all SLAMs."""
-        name = Run(scene=scene, dynamism=dynamism, seed=seed, axis=self.axis).name
-        return self._file(name)
+        return self._file(Run(scene=scene, dynamism=dynamism, seed=seed, axis=self.axis).name)
 
     def _file(self, name: str) -> RunFile:
         path = self.folder / RUN_FILES / f"{name}.npz"
@@ -159,8 +154,7 @@ class Compared:
 
     def check_tables(self) -> None:
         """Read all that is no run."""
-        for table in (self.runs, self.levels, self.paired, self.ages, self.ages_levels):
-            del table
+        _ = self.runs, self.levels, self.paired, self.ages, self.ages_levels
 
     def check(self) -> None:
         """Read all that it has."""

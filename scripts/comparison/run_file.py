@@ -102,6 +102,10 @@ def _check_values(path: Path, arrays: Arrays, wanted: Mapping[str, Array]) -> No
             raise LogFormatError(path, f"array 'slam{k}_stamps_ns' must begin as 'stamps_ns' does")
 
 
+def _raster(values: NDArray[np.float32], cell_m: NDArray[Any], origin: Float) -> Raster:
+    return Raster(values=values, resolution_m=float(cell_m), T_map_origin=origin)
+
+
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Believed:
     """What one SLAM said, at the scans that it answered.
@@ -152,11 +156,8 @@ class RunFile:
         self.laser_angles: Float = a["laser_angle_min"] + beams * a["laser_angle_increment"]
         self.laser_range_max = float(a["laser_range_max"])
         self.T_robot_laser: Float = a["laser_T_robot_laser"]
-        self.static_map = Raster(
-            values=a["static_map"].astype(np.float32),
-            resolution_m=float(a["static_map_resolution_m"]),
-            T_map_origin=a["T_world_origin"],
-        )
+        static = a["static_map"].astype(np.float32)
+        self.static_map = _raster(static, a["static_map_resolution_m"], a["T_world_origin"])
 
     def believed(self, slam: str) -> Believed:
         """What that SLAM said."""
@@ -166,16 +167,5 @@ class RunFile:
         if "map" in a:
             values = a["map"].astype(np.float32) / np.float32(254.0)
             values[a["map"] == UNKNOWN] = np.nan
-            raster = Raster(
-                values=values,
-                resolution_m=float(a["map_resolution_m"]),
-                T_map_origin=a["T_map_origin"],
-            )
-        return Believed(
-            stamps_ns=a["stamps_ns"],
-            poses=a["poses"],
-            covariances=a["covariances"],
-            converged=a["converged"],
-            milliseconds=a["milliseconds"],
-            map=raster,
-        )
+            raster = _raster(values, a["map_resolution_m"], a["T_map_origin"])
+        return Believed(**{name: a[name] for name in ENTRY}, map=raster)

@@ -90,9 +90,7 @@ def pairs(rows: Sequence[Row]) -> list[Row]:
                 both = ([a[seed] for seed in seeds], [b[seed] for seed in seeds])
                 head = {"scene": scene, "dynamism": dynamism, "metric": metric}
                 head |= {"slam_a": slam_a, "slam_b": slam_b}
-                out.append(
-                    head | paired(*both, less_is_better=METRICS[metric].better == "less")
-                )
+                out.append(head | paired(*both, less_is_better=METRICS[metric].better == "less"))
     return out
 
 

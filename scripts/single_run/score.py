@@ -73,12 +73,10 @@ def agreement_words(outcome: Mapping[str, Any]) -> str:
         apart, beside = found["apart_cm"], found["neighbours_cm"]
         revisits = "no place seen twice"
         if apart is not None and beside is not None:
-            revisits = (
-                f"{found['revisits']} revisits {apart:.1f} cm apart (neighbours {beside:.1f})"
-            )
-        parts.append(
-            f"{name}: {revisits}, map {found['sharper_nats']:.2f} nats sharper than shuffled"
-        )
+            near = f"{apart:.1f} cm apart (neighbours {beside:.1f})"
+            revisits = f"{found['revisits']} revisits {near}"
+        sharper = f"map {found['sharper_nats']:.2f} nats sharper than shuffled"
+        parts.append(f"{name}: {revisits}, {sharper}")
     return "Without truth: " + "; ".join(parts) + "." if parts else ""
 
 

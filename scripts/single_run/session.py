@@ -217,14 +217,12 @@ def _spent_s() -> float:
 
 
 def _write_paths(folder: Path, replay: Replay, epoch_ns: int) -> None:
+    paths = {"truth": _truth(replay)}
     for name, track in replay.tracks.items():
-        write_tum(folder / f"trajectory_{file_name(name)}.tum", track.online(), epoch_ns)
-        final = track.final()
-        if final is not None:
-            write_tum(folder / f"trajectory_{file_name(name)}_final.tum", final, epoch_ns)
-    truth = _truth(replay)
-    if truth is not None:
-        write_tum(folder / "trajectory_truth.tum", truth, epoch_ns)
+        paths |= {file_name(name): track.online(), f"{file_name(name)}_final": track.final()}
+    for name, path in paths.items():
+        if path is not None:
+            write_tum(folder / f"trajectory_{name}.tum", path, epoch_ns)
 
 
 def _truth(replay: Replay) -> Trajectory | None:
