@@ -75,7 +75,7 @@ def make(
 ) -> dict[str, Path]:
     """Run the jobs that are missing, stage by stage; the file of each, by its name."""
     files: dict[str, Path] = {}
-    for stage in stages:
+    for stage in filter(lambda stage: stage.jobs, stages):
         folder = out / stage.folder
         ways: dict[str, Any] = {"processes": jobs, "cluster": cluster, "title": stage.title}
         files |= run_jobs(stage.jobs, folder, **ways)

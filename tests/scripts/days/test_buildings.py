@@ -13,11 +13,10 @@ import pytest
 from scripts.comparison import folder, make
 from scripts.comparison.plan import Plan
 from scripts.days import lifelong, scores
-from scripts.days.buildings import Buildings, beside, identity, name_of, of_comparison
+from scripts.days.buildings import beside, identity, name_of, of_comparison
 from scripts.output import read_recipe_words
 from scripts.results import check
 from scripts.verbs import compare
-from sim.recording.recipe import Recipe
 from slam.errors import InvalidValueError, LogFormatError
 from tests.slam.guests import misbehaving
 
@@ -27,7 +26,6 @@ PLAN = Plan(
     slams=("shunting", "odometry", CRASHES), scenes=("arena",), axis="change", levels=(0.3,),
     seeds=(7,), seconds=5.0, every=5, scanner="noise", sessions=2, judge_maps=False,
 )  # fmt: skip
-OF_THE_MACHINE = ("ms_per_scan_early", "ms_per_scan_late", "load_s_early", "load_s_late")
 TABLES = ("runs.csv", "levels.csv", "paired.csv")
 
 
@@ -36,10 +34,6 @@ def compared(tmp_path_factory: pytest.TempPathFactory) -> folder.Compared:
     out = tmp_path_factory.mktemp("ages") / "out"
     make.carry_out(PLAN, out, more=beside(PLAN))
     return folder.read(out)
-
-
-def without_times(rows):
-    return [{key: row[key] for key in row if key not in OF_THE_MACHINE} for row in rows]
 
 
 def test_each_slam_has_a_row_of_each_building(compared):
@@ -76,20 +70,6 @@ def test_the_command_prints_the_scores(compared, capsys):
     assert "failed in 2 of 2 sessions, first: `SLAM 'pipe:" in told
 
 
-def test_what_was_killed_is_made_again_and_nothing_else(compared, tmp_path):
-    out = shutil.copytree(compared.folder, tmp_path / "out")
-    (gone,) = out.glob("days/lives/*odometry*.json")
-    gone.unlink()
-    files = [
-        f for f in out.glob("*/**/arena*") if "runs" not in f.parts and gone.stem not in f.name
-    ]
-    kept = {file: file.stat().st_mtime_ns for file in files}
-    make.carry_out(PLAN, out, more=beside(PLAN))
-    assert gone.exists()
-    assert {file: file.stat().st_mtime_ns for file in kept} == kept
-    assert without_times(folder.read(out).ages) == without_times(compared.ages)
-
-
 def test_without_sessions_the_tables_are_the_same_bytes_and_nothing_is_added(compared, tmp_path):
     for name in ("recordings", "entries"):
         shutil.copytree(compared.folder / name, tmp_path / "out" / name)
@@ -112,20 +92,13 @@ def test_a_building_at_each_level_and_the_same_one_only_once():
     sessions = buildings.recordings()["arena_m0_c0.3_s7"]
     told = [(job.arguments["session"], job.arguments["seconds"]) for job in sessions]
     assert told == [(0, 15.0), (1, 5.0)]
+    longer = replace(buildings, sessions=4).recordings()["arena_m0_c0.3_s7"]
+    assert [job.file_name() for job in longer[:2]] == [job.file_name() for job in sessions]
     held = replace(plan, axis="motion", levels=(0.0, 1.0), change=0.3, seeds=(7,))
     assert [identity(r)["motion"] for r in of_comparison(held).recipes] == [0.0, 1.0]
     one = replace(plan, axis="dynamism", levels=(0.0, 1.0), motion=0.2, change=0.3, seeds=(7,))
     assert [name_of(recipe) for recipe in of_comparison(one).recipes] == ["arena_m0.2_c0.3_s7"]
     assert of_comparison(replace(plan, sessions=None)) is None
-
-
-def test_a_longer_building_goes_on_from_a_shorter_one():
-    recipe = Recipe(scene="arena", seed=7, dynamism=0.0, change=0.3, seconds=5.0)
-    short, long = (
-        Buildings(slams=("odometry",), recipes=(recipe,), sessions=n).recordings() for n in (2, 4)
-    )
-    names = [[job.file_name() for job in own] for own in (*short.values(), *long.values())]
-    assert names[1][:2] == names[0]
 
 
 @pytest.mark.parametrize(
