@@ -7,16 +7,17 @@ each. At night doors are shut that the map of the evening holds open.
 """
 
 import math
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from typing import Any
 
 from scripts.comparison import schema
 from scripts.comparison.schema import ANEW, DAYS, OVER_TIME
 from scripts.comparison.schema import OLD as AGES
-from scripts.comparison.tables import Row, median_of, share_of, summary
+from scripts.comparison.tables import median_of, share_of, summary
 from sim.world.times_of_day import DAY
 
+Row = Mapping[str, Any]
 SOON_S = 10.0  # within which a session is to be found
 _OF_A_MAP = ("ghost_seen_rate", "map_kb", "memory_mb", "load_s")  # none for a SLAM without days
 A_DAY = len(DAY)  # sessions
@@ -70,7 +71,7 @@ def _soon(rows: Sequence[Row]) -> int:
 
 def of_building(
     identity: Row, rows: Sequence[Row], aged: Sequence[Row], failure: str | None = None
-) -> Row:
+) -> dict[str, Any]:
     """The row (``COLUMNS``) of one SLAM in one building.
 
     rows   of its sessions, in order; ``aged``: of the last one in older maps
@@ -93,7 +94,7 @@ def of_building(
     return row if anew else row | _of_days(row, rows, aged)
 
 
-def _of_days(row: Row, rows: Sequence[Row], aged: Sequence[Row]) -> Row:
+def _of_days(row: Row, rows: Sequence[Row], aged: Sequence[Row]) -> dict[str, Any]:
     """What only a SLAM that can load a map has."""
     own = later(rows)
     found: dict[str, Any] = dict(counts(own))
@@ -186,7 +187,7 @@ def levels(rows: Sequence[Row]) -> list[dict[str, Any]]:
     """
     by_key = {score.key: score for score in SCORES}
 
-    def summed(metric: str, group: Sequence[Row]) -> Row:
+    def summed(metric: str, group: Sequence[Row]) -> dict[str, Any]:
         score = by_key[metric]
         own = [row for row in group if row[score.hits or score.key] is not None]
         if not score.hits:

@@ -2,7 +2,7 @@
 """A log's twin: building, way, scanner, odometry as wrong as its own; both in one picture."""
 
 import math
-from collections.abc import Mapping, Sequence
+from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
@@ -28,25 +28,6 @@ from slam.logs import open_log
 from slam.replay import Replay
 
 PASSES = 2  # the second time with better poses
-
-
-def written_building(
-    frames: Sequence[Frame], poses: Float, stem: Path, log: str
-) -> tuple[Path, Float]:
-    """Write the scene of what scans at ``poses`` show, as STEM.toml and STEM.xml.
-
-    Returns the former and the poses (n, 3), put right by its walls.
-    """
-    scans = [frame.scan for frame in frames if frame.scan is not None]
-    mount, angles = scans[0].spec.T_robot_laser, scans[0].spec.angles
-    ranges = np.array([np.where(scan.valid, scan.ranges, np.nan) for scan in scans])
-    for _ in range(PASSES):
-        raster = evidence_of(scans, poses).raster()
-        drawn = plan(raster, FromMap(path=poses[:, :2], things=False, few=False), source=log)
-        lasers = np.array([se2.compose(pose, mount) for pose in poses])
-        walls, lasers = laid(drawn.walls, lasers, ranges.astype(np.float64), angles)
-        poses = np.array([se2.compose(laser, se2.inverse(mount)) for laser in lasers])
-    return write(replace(drawn, walls=walls), stem, made_of=log), poses
 
 
 REFERENCE = "reference"
@@ -127,9 +108,19 @@ def _alike(one: Frame, other: Frame) -> bool:
 
 
 def housed(log: Recorded, folder: Path) -> tuple[Recorded, Path]:
-    """The log with its poses put right by the walls, and its building, written into ``folder``."""
-    name = str(log.stream.metadata.extra.get("file", "a log"))
-    scene, poses = written_building(log.frames, log.poses, folder / "building", name)
+    """The log with its poses put right by the walls, and the scene of what its scans show, as
+    building.toml and building.xml in ``folder``."""
+    name, poses = str(log.stream.metadata.extra.get("file", "a log")), log.poses
+    scans = [frame.scan for frame in log.frames if frame.scan is not None]
+    mount, angles = log.spec.T_robot_laser, log.spec.angles
+    ranges = np.array([np.where(scan.valid, scan.ranges, np.nan) for scan in scans])
+    for _ in range(PASSES):
+        raster = evidence_of(scans, poses).raster()
+        drawn = plan(raster, FromMap(path=poses[:, :2], things=False, few=False), source=name)
+        lasers = np.array([se2.compose(pose, mount) for pose in poses])
+        walls, lasers = laid(drawn.walls, lasers, ranges.astype(np.float64), angles)
+        poses = np.array([se2.compose(laser, se2.inverse(mount)) for laser in lasers])
+    scene = write(replace(drawn, walls=walls), folder / "building", made_of=name)
     return replace(log, poses=poses), scene
 
 
