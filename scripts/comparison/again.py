@@ -16,6 +16,7 @@ from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
 OF_ONE = ("run", "demo", None)  # commands that leave one run
 OF_THE_RUN = ("slams", "seconds", "simulation")  # in the recipe of a run; the rest is the world's
+_OF_PLAN = [field.name for field in fields(Plan)]
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -65,11 +66,9 @@ def again(path: Path, trust: bool = False) -> Again:
         raise LogFormatError(recipe, "no recipe of a run: it has no settings")
     slams = tuple(slams_of(recipe, settings))
     if "log" in settings:
-        named = [name for name in slams if name != "odometry"][:1]
-        film = " ".join(
-            [f"render '{settings['log']}' itself", *(f"with --slam {n}" for n in named)]
-        )
-        why = f"this run was on a log, which is not kept in it: for a film, {film}"
+        slam = "".join([f" with --slam {name}" for name in slams if name != "odometry"][:1])
+        film = f"for a film, render '{settings['log']}' itself{slam}"
+        why = f"this run was on a log, which is not kept in it: {film}"
         raise LogFormatError(recipe.parent, why)
     if "scene" not in settings or "seconds" not in settings:
         raise LogFormatError(recipe.parent, why_no_run(recipe.parent, command))
@@ -110,16 +109,11 @@ def run_of(path: Path, trust: bool = False) -> Again:
     check_world(recipe, world_of(recipe, words))
     try:
         settings |= {"slams": slams_of(recipe, settings), "scenes": scenes_of(recipe, settings)}
-    except LogFormatError as error:
-        why = f"no recipe of a comparison: {error.message}"
+        told: dict[str, Any] = {k: settings[k] for k in _OF_PLAN if k in settings}
+        plan = Plan(**{k: tuple(v) if isinstance(v, list) else v for k, v in told.items()})
+    except (TypeError, InvalidValueError, UnknownNameError, LogFormatError) as error:
+        why = f"no recipe of a comparison: {getattr(error, 'message', error)}"
         raise LogFormatError(recipe, why) from error
-    known = [field.name for field in fields(Plan)]
-    try:
-        told: dict[str, Any] = {k: v for k, v in settings.items() if k in known}
-        told |= {k: tuple(v) for k, v in told.items() if isinstance(v, list)}
-        plan = Plan(**told)
-    except (TypeError, InvalidValueError, UnknownNameError) as error:
-        raise LogFormatError(recipe, f"no recipe of a comparison: {error}") from error
     for run in plan.runs():
         if run.name == path.stem:
             return _of(plan.recipe(run), trust, slams=plan.slams, every=plan.every)
