@@ -26,10 +26,11 @@ from scripts.console import note, progress
 from scripts.machine import versions
 from scripts.pace import Work, learn
 from sim.recording.sums import damage_beside, write_beside
-from slam import locks
+from slam import locks, system
 from slam.errors import InvalidValueError, MobiliaError, OutputError, SlamFailedError
 from slam.files import PART, is_full, is_part, make_folder, put, reason, remove
 from slam.guests import Limits, limited
+from slam.variants import parsed
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -101,12 +102,15 @@ def _files(path: Path) -> list[tuple[str, Path]]:
 
 
 def try_names(slams: Iterable[str], scenes: Iterable[str]) -> None:
-    """Make each once: wrong names are told before anything starts."""
+    """Wrong names are told before anything starts: what is not ours is made once, of our SLAMs the
+    config.
+    """
     for name in scenes:
         if name not in registry.OWN:
             registry.build(name)
     for name in slams:
-        limited(name, Limits())
+        if parsed(name)[0] not in system.OWN or system.config_of(name) is None:
+            limited(name, Limits())
 
 
 def run_jobs(

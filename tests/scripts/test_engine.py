@@ -13,7 +13,7 @@ import pytest
 
 from scripts.engine import Stage, Study, carry_out
 from scripts.jobs import Job
-from slam.errors import OutputError, SlamFailedError, UnknownNameError
+from slam.errors import InvalidValueError, OutputError, SlamFailedError, UnknownNameError
 from slam.files import write_text
 
 REPO = Path(__file__).resolve().parents[2]
@@ -92,9 +92,15 @@ def test_tables_that_cannot_be_written_leave_those_of_before(tmp_path):
     assert {file.name: file.read_bytes() for file in out.iterdir() if file.is_file()} == before
 
 
-@pytest.mark.parametrize("wrong", [{"slams": ["nobody"]}, {"scenes": ["nowhere"]}])
+@pytest.mark.parametrize(
+    "wrong",
+    [
+        {"slams": ["nobody"]}, {"slams": ["shunting{nothing=1}"]}, {"slams": ["no_module:Slam"]},
+        {"slams": ["oracle(nobody)"]}, {"scenes": ["nowhere"]}, {"scenes": ["no_module:room"]},
+    ],
+)  # fmt: skip
 def test_wrong_names_are_told_before_anything_starts(tmp_path, wrong):
-    with pytest.raises(UnknownNameError):
+    with pytest.raises((UnknownNameError, InvalidValueError)):
         carry_out(study(**wrong), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
