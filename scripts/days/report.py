@@ -90,10 +90,9 @@ def operator(shown: Sequence[Change], every: Sequence[Change]) -> str:
         if change.kind == "door":
             number = 1 + min(range(len(hinges)), key=lambda k: math.dist(change.at, hinges[k]))
             told.append(f"door {number} turned by {abs(change.angle_deg):.0f}°")
-    for kind, words in (("moved", "moved"), ("appeared", "appeared"), ("gone", "gone")):
+    for kind in ("moved", "appeared", "gone"):
         count = sum(change.kind == kind for change in shown)
-        things = "thing" if count == 1 else "things"
-        told += [f"{count} {things} {words}"] if count else []
+        told += [f"{count} thing{'' if count == 1 else 's'} {kind}"] if count else []
     return ", ".join(told) or "nothing changed that it could tell"
 
 
@@ -110,10 +109,9 @@ def _rows(found: Mapping[tuple[int, int], Sequence[Change]]) -> list[list[object
     for (first, second), changes in found.items():
         for c in changes:
             before = ("", "") if c.before is None else (f"{c.before[0]:.3f}", f"{c.before[1]:.3f}")
-            rows.append(
-                [first, second, c.kind, f"{c.at[0]:.3f}", f"{c.at[1]:.3f}", *before,
-                 f"{c.size_m:.2f}", f"{c.angle_deg:.0f}", f"{c.confidence:.3f}"]
-            )  # fmt: skip
+            at = (f"{c.at[0]:.3f}", f"{c.at[1]:.3f}")
+            size = (f"{c.size_m:.2f}", f"{c.angle_deg:.0f}", f"{c.confidence:.3f}")
+            rows.append([first, second, c.kind, *at, *before, *size])
     return rows
 
 

@@ -137,13 +137,9 @@ def _stays(poses: Float) -> list[tuple[Float, NDArray[np.bool_]]]:
 
 def _met(recording: Recording, row: int, sights: Sequence[Float], scans: Sequence[int]) -> Float:
     """(n, 2) m, where beams of those scans met a mover."""
-    parts = [np.zeros((0, 2))]
-    for k in scans:
-        hit = recording.hit[k] == row
-        if hit.any():
-            points = sights[k][hit]
-            parts.append(points[np.isfinite(points).all(axis=1)])
-    return np.concatenate(parts)
+    met = (sights[k][recording.hit[k] == row] for k in scans)
+    points = np.concatenate([np.zeros((0, 2)), *met])
+    return np.asarray(points[np.isfinite(points).all(axis=1)])
 
 
 @dataclass(frozen=True, kw_only=True)

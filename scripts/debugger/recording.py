@@ -158,11 +158,7 @@ class Strip:
 
     def cut(self, first: int, last: int) -> "Strip":
         """Rows ``first`` to ``last``."""
-        rows = slice(first, last + 1)
-        return Strip(
-            frames=self.frames[rows], truth=self.truth[rows], believed=self.believed[rows],
-            poses=self.poses[rows], beams=self.beams[rows],
-        )  # fmt: skip
+        return Strip(*(column[first : last + 1] for column in vars(self).values()))
 
     def stamps_ns(self) -> NDArray[np.int64]:
         """(n,) of the rows."""
@@ -280,10 +276,8 @@ class Checkpoint:
 
         Raises ``SlamFailedError`` for a SLAM that does not repeat itself.
         """
-        if self._repeats(last):
-            return
-        if self.how == "copy":
-            self.how = "replay"
+        for how in dict.fromkeys((self.how, "replay")):
+            self.how = how
             if self._repeats(last):
                 return
         raise SlamFailedError(
@@ -292,11 +286,11 @@ class Checkpoint:
         )
 
     def _repeats(self, last: int) -> bool:
-        again, strip, rows = self.rerun(Change(), last), self.tape.strip, slice(self.row, last + 1)
-        same = again.frames == strip.frames[rows] and _equal(again.truth, strip.truth[rows])
-        if not (same and _equal(again.poses, strip.poses[rows])):
+        again, once = self.rerun(Change(), last), self.tape.strip.cut(self.row, last)
+        same = again.frames == once.frames and _equal(again.truth, once.truth)
+        if not (same and _equal(again.poses, once.poses)):
             raise MobiliaError("the world re-run from its checkpoint is not the one it was")
-        return _equal(again.believed, strip.believed[rows])
+        return _equal(again.believed, once.believed)
 
     def rerun(self, change: Change, last: int, *, noise: int = 0) -> Strip:
         """Rows from here to ``last`` with a change; ``noise`` > 0: other draws of the scanner."""
@@ -308,12 +302,10 @@ class Checkpoint:
         if noise:
             seed = simulation.world.seeds.integer("lidar")
             for k, stream in enumerate(simulation.laser.streams):
-                stream.bit_generator.state = np.random.default_rng(
-                    [seed, noise, k]
-                ).bit_generator.state
-        track = self._slam()
+                other = np.random.default_rng([seed, noise, k])
+                stream.bit_generator.state = other.bit_generator.state
         strip = Strip()
-        ear = _Ear(simulation, strip, track, case.every)
+        ear = _Ear(simulation, strip, self._slam(), case.every)
         for scan in range(self._scan, last * case.every + 1):
             ear.scan(scan, self.tape.commands[scan])
         return strip

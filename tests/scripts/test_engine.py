@@ -100,7 +100,7 @@ def test_tables_that_cannot_be_written_leave_those_of_before(tmp_path):
     ],
 )  # fmt: skip
 def test_wrong_names_are_told_before_anything_starts(tmp_path, wrong):
-    with pytest.raises((UnknownNameError, InvalidValueError)):
+    with pytest.raises((UnknownNameError, InvalidValueError, SlamFailedError)):
         carry_out(study(**wrong), tmp_path / "out")
     assert not (tmp_path / "out").exists()
 
