@@ -110,7 +110,8 @@ def run_of(path: Path, trust: bool = False) -> Again:
     try:
         settings |= {"slams": slams_of(recipe, settings), "scenes": scenes_of(recipe, settings)}
         told: dict[str, Any] = {k: settings[k] for k in _OF_PLAN if k in settings}
-        plan = Plan(**{k: tuple(v) if isinstance(v, list) else v for k, v in told.items()})
+        told |= {k: tuple(v) for k, v in told.items() if isinstance(v, list)}
+        plan = Plan(**told)
     except (TypeError, InvalidValueError, UnknownNameError, LogFormatError) as error:
         why = f"no recipe of a comparison: {getattr(error, 'message', error)}"
         raise LogFormatError(recipe, why) from error
