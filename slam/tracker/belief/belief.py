@@ -123,6 +123,8 @@ class Belief:
         elif match.tau > 0.0:  # by odometry: what it was matched to says nothing
             by_odometry = unmatched(prediction.T_map_robot, matched=match.matched, score=0.0)
             match = replace(by_odometry, overlapped=match.overlapped)
+            if prediction.elapsed <= OFTEN_S:
+                self._agreement.drop()
         self._weigh(doubt)
         if doubt is None and self.p_lost <= config.belief.frozen_above:
             return self._settled(cell_map, match, prediction)
@@ -277,7 +279,10 @@ class Belief:
         better = probabilities([0.0, place.latest - doubt.evidence])[1] >= 1.0 - config.frozen_above
         if not (asked and explained and better and broken):
             return False
-        return gain_m(doubt.cell_map, everyone, place.match, doubt.match) >= config.far_m
+        if gain_m(doubt.cell_map, everyone, place.match, doubt.match) < config.far_m:
+            return False
+        here = seen_at(doubt.cell_map, everyone, doubt.match.T_map_robot)
+        return here.through - here.known > config.hidden_m  # not only new: something is missing
 
     def _slipped(self, doubt: Doubt, found: Match, prediction: Prediction) -> Judged:
         """The robot is there, and its map goes on from there."""

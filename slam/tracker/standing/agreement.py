@@ -46,6 +46,7 @@ class Agreement:
 
     def _begin_window(self) -> None:
         self._sum, self._by_movers = np.zeros(3), np.zeros(3)
+        self._newest = np.zeros(3), np.zeros(3)
         self._variance, self._elapsed_s = np.zeros((3, 3)), 0.0
         self._way_m = self._turn_rad = 0.0
 
@@ -93,11 +94,17 @@ class Agreement:
         keep = math.exp(-prediction.elapsed / self._config.window_s)
         x, y, turn = prediction.increment.tolist()
         off, self._elapsed_s = prediction.off(T_map_robot), prediction.elapsed
+        self._newest = off, self._left_to_movers(off, weight)
         self._sum = keep * self._sum + off
-        self._by_movers = keep * self._by_movers + self._left_to_movers(off, weight)
+        self._by_movers = keep * self._by_movers + self._newest[1]
         self._variance = keep * keep * self._variance + prediction.covariance
         self._way_m = keep * self._way_m + math.hypot(x, y)
         self._turn_rad = keep * self._turn_rad + abs(turn)
+
+    def drop(self) -> None:
+        """The newest match is not believed: the pose was not corrected by it."""
+        off, by_movers = self._newest
+        self._sum, self._by_movers = self._sum - off, self._by_movers - by_movers
 
     @property
     def denied(self) -> float:
