@@ -10,11 +10,13 @@ import pytest
 from slam import se2
 from slam.estimate import Estimate
 from slam.frames import Frame
-from slam.frontend.observations import Observations
+from slam.frontend.observations import Observations, observe
 from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.tracker.belief.doubt import Doubt
 from slam.tracker.belief.places import Place, Places
 from slam.tracker.belief.state import State
 from slam.tracker.matching.budget import Budget
+from slam.tracker.matching.matcher import unmatched
 from slam.tracker.tracker import Tracker
 from tests.slam.tracker.belief.drives import (
     DOUBTFUL,
@@ -277,6 +279,23 @@ def test_no_scan_of_a_lost_robot_does_more_than_its_budget_and_it_is_found(
     counted = max(prices.lost_share, prices.frozen_share) * budget_ms * 1e6
     match_ns = 361 * prices.climb_ns + 90 * prices.approach_ns
     assert 0.0 < max(spent) <= counted + match_ns  # the item at which it is spent
+
+
+@pytest.mark.parametrize(("led", "taken"), [((-2.0, 1.0, 2.0), True), ((60.0, 0.0, 0.0), False)])
+def test_new_surface_alone_moves_nobody_elsewhere(led: Pose, taken: bool) -> None:
+    """Where motion led to what was never in view nothing is missing, however well a place fits."""
+    system, last = mapped(ROOMS)
+    belief, numbers = system._belief, FAST.belief
+    frame = going_on(still(ROOMS, PLACE, 0.2), last)[0]
+    everyone = observe(frame, np.zeros(3), FAST).weighted(None)
+    doubt = Doubt(system.cell_map, belief._matcher)
+    doubt.evidence = -9.0
+    doubt.match = unmatched(np.array(led), matched=0.0, score=0.0)
+    place = Place(
+        match=unmatched(np.array(PLACE), matched=1.0, score=1.0), latest=9.0, scans=numbers.again,
+        way=np.array([1.0, 1.0, 2.0]),
+    )  # fmt: skip
+    assert belief._is_certain(doubt, place, everyone, goes_on=False) is taken
 
 
 @pytest.mark.parametrize("hidden", [False, True])

@@ -146,6 +146,17 @@ def test_odometry_leads_without_the_corrections_of_the_window_which_begins_anew(
     assert [one.shown(np.eye(3)).any() for one in held] == [True, False]
 
 
+def test_a_match_that_is_not_believed_corrects_nothing() -> None:
+    """Else the robot is put back by what it was never moved by."""
+    believed = np.tile([0.01, -0.02, 0.003], (5, 1))
+    agreement, taken = fed(believed), fed(np.vstack([believed, np.zeros((1, 3))]))
+    agreement.take(by_odometry(), np.array([0.8, 0.5, 0.3]), 0.0)
+    agreement.drop()
+    pose = np.array([1.0, 2.0, 0.5])
+    assert agreement.led(pose) == pytest.approx(taken.led(pose), abs=1e-12)
+    assert to_movers(agreement) == pytest.approx(to_movers(taken), abs=1e-12)
+
+
 def test_in_a_map_that_was_turned_the_old_surface_holds_as_before() -> None:
     """After a loop's correction: else all of the next one would be left to movers."""
     turn, rows = 0.8, np.tile([0.01, 0.0, 0.0], (10, 1))
