@@ -51,14 +51,14 @@ def parsed(folder: str, name: str) -> mujoco.MjSpec:
     """The spec of a plan or part; ``InvalidValueError`` names a file that cannot be read, and why.
 
     A file from elsewhere has the materials and classes of ours, and angles in radians, whether it
-    includes them or not.
+    includes them or not; one of ours must include them.
     """
     path = file_of(folder, name)
-    if path.parent == HERE / folder:
-        return mujoco.MjSpec.from_file(str(path))
     texts = {file.name: file.read_bytes() for file in (HERE / own for own in SHARED[folder])}
-    text = checked(path, folder, tuple(texts))
+    text = None if path.parent == HERE / folder else checked(path, folder, tuple(texts))
     try:
+        if text is None:
+            return mujoco.MjSpec.from_file(str(path))
         return mujoco.MjSpec.from_string(text, include=texts)
     except ValueError as error:
         words = " ".join(str(error).split())

@@ -2,7 +2,7 @@
 """What is to be compared, and the jobs that it takes: one a run, and one for each SLAM on it."""
 
 from collections.abc import Callable, Iterator, Mapping, Sequence
-from dataclasses import asdict, dataclass, field, replace
+from dataclasses import asdict, dataclass, field, fields, replace
 from pathlib import Path
 from typing import Any
 
@@ -147,9 +147,9 @@ class Plan(Asked):
 
     def _check_file(self) -> None:
         """What no recipe could hold would not be read again."""
-        for name, kind in {**settings(self.axis), **LATER}.items():
-            if hasattr(self, name):
-                shaped(f"Plan.{name}", getattr(self, name), kind)
+        kinds = {**settings(self.axis), **LATER}
+        for one in fields(self):  # a new one wants a row of ``LATER``
+            shaped(f"Plan.{one.name}", getattr(self, one.name), kinds[one.name])
 
     def _check_sessions(self) -> None:
         if self.sessions is None:

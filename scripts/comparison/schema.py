@@ -138,6 +138,8 @@ LATER: Columns = {
     "scene_sha256": dict[str, Line],
 }  # fmt: skip
 """Settings that recipes of before did not have."""
+NOT_ASKED = ("axis", "odometry", "sets", "judge_maps", "scene_sha256")
+"""Those of them that are no options of ``mobilia compare``."""
 RECIPE: Columns = {
     "command": word(among=("compare",)), "settings": dict[str, Any], "versions": dict[str, Any],
 }  # fmt: skip

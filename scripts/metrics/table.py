@@ -27,7 +27,8 @@ class Metric:
     key            its column in runs.csv, its name in levels.csv and paired.csv
     unit           of its value: SI and radians, ms and MB for costs
     better         None where neither less nor more is
-    compute        None where the code that watches the run fills it: outcome, memory, maps, drive
+    compute        None where ``scripts.comparison`` fills it: ``entry``, or ``make`` for
+                   the section "drive"
     label          technical name, as ``run`` prints it
     section        where the report shows it
     summary        how runs are summed up in levels.csv; None: it is a column of runs.csv alone

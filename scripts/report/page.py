@@ -9,7 +9,7 @@ from typing import Any
 
 from scripts.closed_loop.tables import Driven
 from scripts.comparison.plan import Run
-from scripts.comparison.schema import LATER, settings
+from scripts.comparison.schema import LATER, NOT_ASKED, settings
 from scripts.figures import color_of, glyph
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, Section, of_section
 from scripts.pages.page import template
@@ -160,12 +160,12 @@ def _recipe(study: Study) -> dict[str, Any]:
 
 def _command(told: dict[str, Any]) -> str:
     """The command line that asks for this comparison."""
-    seeds, knobs = told["seeds"], ("motion", "change", "crowd", "sessions")
+    seeds, knobs = told["seeds"], [name for name in LATER if name not in NOT_ASKED]
     given = {
         "slam": told["slams"],
         "scene": told["scenes"],
         told.get("axis", "dynamism"): [f"{level:g}" for level in told["levels"]],
-        **{name: [told[name]] for name in knobs if told.get(name) is not None},
+        **{k.replace("_", "-"): [told[k]] for k in knobs if told.get(k) is not None},
         "seeds": [len(seeds)],
         "first-seed": seeds[:1],
         "seconds": [f"{told['seconds']:g}"],

@@ -225,8 +225,8 @@ class BagWriter:
             self._put(topic, stamp_ns, data)
 
     def _put_all(self, messages: Iterable[Message]) -> None:
-        for message in messages:
-            self._put(*message)
+        for topic, stamp_ns, data in messages:
+            self._put(topic, stamp_ns, data)
 
     def _put(self, topic: str, stamp_ns: int, data: bytearray) -> None:
         time_ns = stamp_ns + EPOCH_NS
