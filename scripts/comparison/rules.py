@@ -128,7 +128,7 @@ def _cell(name: str, given: Any, kind: Kind) -> Any:
     if given == "" or given != given:
         given = None
     value = shaped(name, word_of(given) if isinstance(given, str) else given, kind, strict=False)
-    if isinstance(value, float) and not (abs(value) <= MOST or math.isinf(value)):
+    if isinstance(value, (int, float)) and not (abs(value) <= MOST or abs(value) == math.inf):
         raise InvalidValueError(f"{name} must be at most {MOST:g} or infinite, got {given!r:.80}")
     return value
 

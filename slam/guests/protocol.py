@@ -38,7 +38,7 @@ _NO_JSON_NUMBER = re.compile(
 )
 _Pose = tuple[float | None, float | None, float | None]
 _Nine = Annotated[tuple[float | None, ...], Meta(min_length=9, max_length=9)]
-_Count = Annotated[int, Meta(ge=0)]
+_Count = Annotated[int, Meta(ge=0, le=MAX_CELLS)]
 _Stamp = Annotated[int, Meta(ge=-MOST_NS, le=MOST_NS)]
 S = TypeVar("S", bound=Struct)
 

@@ -184,6 +184,8 @@ def test_garbage_is_no_message(line):
         {"values": 5},
         {"values": [True, 0.0]},
         {"width": protocol.MAX_CELLS + 1},
+        {"width": protocol.MAX_CELLS, "height": 2},
+        {"width": 10**3000, "height": 10**3000},
     ],
 )
 def test_what_is_no_map_is_bad(change):
@@ -193,6 +195,7 @@ def test_what_is_no_map_is_bad(change):
     with pytest.raises(SlamFailedError) as got:
         protocol.map_of({**good, **change})
     assert got.value.outcome == "bad"
+    assert len(str(got.value)) < 250
 
 
 @pytest.mark.parametrize(
