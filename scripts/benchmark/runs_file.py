@@ -250,7 +250,7 @@ def _results(path: Path, data: Row) -> Results:
     for key, told in data["runs"].items():
         track, level, seed = key.split(" ")
         at = (float(level), int(seed))
-        check_keys(path, f"{key:.80}: ", {"level": at[0], "seed": at[1], **told}, _RUN)
+        check_keys(path, f"{key:.80}: ", {**told, "level": at[0], "seed": at[1]}, _RUN)
         if at[0] not in LEVELS:
             raise LogFormatError(path, f"{key:.80}: level must be of {LEVELS}")
         if track not in runs or key != _key(track, at):
