@@ -50,10 +50,10 @@ def _decoded(path: Path, data: bytes, most: int) -> tuple[Bytes, Bools | None]:
             with Image.open(BytesIO(data), formats=_FORMATS) as image:
                 if image.width * image.height > most:
                     size = f"{image.width} x {image.height} pixels"
-                    raise LogFormatError(path, f"{size}, expected at most {most}")
+                    raise LogFormatError(path, f"{size}, at most {most} are allowed")
                 return _gray(path, image)
     except UnidentifiedImageError:
-        raise LogFormatError(path, f"no image that can be read: {_CURE}") from None
+        raise LogFormatError(path, f"damaged, or no image that is read: {_CURE}") from None
     except (LogFormatError, MemoryError):
         raise
     except Exception as error:  # decoders of others, on damaged bytes

@@ -154,7 +154,7 @@ def test_a_file_claims_no_more_than_a_map_can_have(tmp_path):
     ("old", "new", "match"),
     [
         ("image: map.pgm", "image: gone.pgm", "gone.pgm: cannot be read"),
-        ("image: map.pgm", "image: map.yaml", "no image that can be read: expected PGM, PNG"),
+        ("image: map.pgm", "image: map.yaml", "no image that is read: expected PGM, PNG"),
         ("resolution: 0.05\n", "", "has no resolution"),
         ("resolution: 0.05", "resolution: fine", "resolution must be a number .*, got fine"),
         ("resolution: 0.05", "resolution: {m: 1}", "resolution must be one value, got fields"),
@@ -190,7 +190,7 @@ def test_missing_and_truncated_files_are_refused(tmp_path):
     with pytest.raises(LogFormatError, match="4 x 3 pixels expected, found 11"):
         maps.read_map(yaml)
     pgm.write_bytes(b"P5" + b" " * 100_000 + b"x")
-    with pytest.raises(LogFormatError, match="image that can"):
+    with pytest.raises(LogFormatError, match="an image that cannot be read"):
         maps.read_map(yaml)
     for data, why in ((b"\xff\xfe\x00", "UTF-16"), (b"# B\xfcro\n", "byte 3 is no UTF-8; save it")):
         yaml.write_bytes(data)
