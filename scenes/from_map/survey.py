@@ -99,7 +99,8 @@ def survey(  # noqa: PLR0913 (what is known of a building)
     away = reach & ~_beside([gap.at for gap in gaps], cells)
     found = floors.spots(passable_m, away if away.any() else reach, begin, cells.cell_m, robot_m)
     spots = cells.points([begin, *found])
-    rooms = _rooms(labels, cells.cell_m, cells.T_map_cells, source)
+    least_m = floors.RECT_M * min(1.0, robot_m / floors.ROBOT_M)
+    rooms = _rooms(labels, cells, least_m, source)
     x, y = start[:2] if start is not None else spots[0]
     goals = [spot for spot in spots[1:] if _inside(spot, rooms)] or spots[1:]
     if not _inside((x, y), rooms):
@@ -234,11 +235,12 @@ def _outside(walls: Mask, cells: Cells) -> Mask:
 
 
 def _rooms(
-    labels: NDArray[np.int32], cell_m: float, T_map_cells: Float, source: str
+    labels: NDArray[np.int32], cells: Cells, least_m: float, source: str
 ) -> dict[str, tuple[Rect, ...]]:
     """Rectangles along the axes of the map, of floor that is all of one room."""
     from scipy.ndimage import find_objects
 
+    cell_m, T_map_cells = cells.cell_m, cells.T_map_cells
     height, width = labels.shape
     low, high = _corners((0, 0, width, height), cell_m, T_map_cells)
     at_x, at_y = (np.flatnonzero(labels.any(axis=axis)) for axis in (0, 1))
@@ -265,7 +267,7 @@ def _rooms(
         if n_rects >= floors.MAX_RECTS:
             break
         own = coarse[window] == label if window else np.zeros((0, 0), dtype=bool)
-        rects = floors.rectangles(own, round(floors.RECT_M / step), floors.ROOM_RECTS, 0.9)
+        rects = floors.rectangles(own, round(least_m / step), floors.ROOM_RECTS, 0.9)
         if not rects:
             continue
         n_rects += len(rects)

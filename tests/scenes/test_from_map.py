@@ -119,7 +119,7 @@ def test_where_no_robot_has_room_its_radius_is_named_and_a_smaller_one_drives():
     with pytest.raises(InvalidValueError, match=said):
         plan(small_world(), FromMap(things=False), source="tb")
     made = plan(small_world(), FromMap(things=False, robot_m=0.12))
-    assert len(made.goals) >= 3
+    assert len(made.goals) >= 2
     with pytest.raises(InvalidValueError, match=r"no free floor where a robot of 1 m radius"):
         plan(two_rooms(), FromMap(robot_m=1.0, things=False, start=(0.0, 0.0, 0.0)))
     with pytest.raises(InvalidValueError, match=r"FromMap.robot_m must lie in 0.01..3, got nan"):
