@@ -120,8 +120,8 @@ def test_where_no_robot_has_room_its_radius_is_named_and_a_smaller_one_drives():
         plan(small_world(), FromMap(things=False), source="tb")
     made = plan(small_world(), FromMap(things=False, robot_m=0.12))
     assert len(made.goals) >= 2
-    with pytest.raises(InvalidValueError, match=r"no free floor where a robot of 1 m radius"):
-        plan(two_rooms(), FromMap(robot_m=1.0, things=False, start=(0.0, 0.0, 0.0)))
+    with pytest.raises(InvalidValueError, match=r"no free floor where a robot of 2.95 m radius"):
+        plan(two_rooms(), FromMap(robot_m=2.95, things=False, start=(0.0, 0.0, 0.0)))
     with pytest.raises(InvalidValueError, match=r"FromMap.robot_m must lie in 0.01..3, got nan"):
         FromMap(robot_m=math.nan)
 

@@ -11,7 +11,7 @@ from PIL import Image
 from scenes.from_map import plan
 from slam.estimate import Raster
 from slam.maps import read_map
-from tests.slam.logs.kinds import Kind
+from tests.scripts.kinds.kind import Kind
 
 GRAYS = np.full((60, 80), 254, dtype=np.uint8)
 GRAYS[:2], GRAYS[-2:], GRAYS[:, :2], GRAYS[:, -2:], GRAYS[:40, 50] = 0, 0, 0, 0, 0

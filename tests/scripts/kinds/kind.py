@@ -1,8 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """Inputs as people have them: what is done with each kind, and what is said.
 
-The table of ``docs/logs.md`` is made of these: ``python -m tests.slam.logs.kinds`` fills it. Every
-module ``kinds_of_*.py`` here has a list ``KINDS``; ``test_kinds.py`` tries each of them.
+The table of ``docs/logs.md`` is made of these: ``python -m tests.scripts.kinds.kind`` fills it.
+Every module ``of_*.py`` here has a list ``KINDS``; ``test_kinds.py`` tries each of them.
 """
 
 import importlib
@@ -60,8 +60,8 @@ def is_said(said: str, heard: str) -> bool:
 
 def gathered() -> list[Kind]:
     """Of all modules, in the order of their names."""
-    names = sorted(path.stem for path in HERE.glob("kinds_of_*.py"))
-    modules = [importlib.import_module(f"tests.slam.logs.{name}") for name in names]
+    names = sorted(path.stem for path in HERE.glob("of_*.py"))
+    modules = [importlib.import_module(f"tests.scripts.kinds.{name}") for name in names]
     return [kind for module in modules for kind in module.KINDS]
 
 

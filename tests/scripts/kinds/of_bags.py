@@ -6,7 +6,7 @@ from pathlib import Path
 
 import tests.slam.logs.foreign_bags as bags
 from slam.frames import Frame
-from tests.slam.logs.kinds import Kind, read_log
+from tests.scripts.kinds.kind import Kind, read_log
 
 N, STEP_NS = 40, 100_000_000
 

@@ -4,7 +4,7 @@
 import pytest
 
 from slam.errors import MobiliaError
-from tests.slam.logs.kinds import MARK, PAGE, Kind, gathered, is_said, told
+from tests.scripts.kinds.kind import MARK, PAGE, Kind, gathered, is_said, told
 
 ALL = gathered()
 
@@ -31,5 +31,5 @@ def test_what_is_done_and_said(kind: Kind, tmp_path, caplog):
 @pytest.mark.docs
 def test_the_page_has_the_table():
     page = PAGE.read_text(encoding="utf-8")
-    fill = "python -m tests.slam.logs.kinds"
+    fill = "python -m tests.scripts.kinds.kind"
     assert f"<!-- {MARK} -->\n\n{told(ALL)}\n\n<!-- /{MARK} -->" in page, f"{fill} fills it"

@@ -8,8 +8,8 @@ from pathlib import Path
 import numpy as np
 
 from slam.frames import Frame
+from tests.scripts.kinds.kind import Kind, read_log
 from tests.slam.logs.conftest import CarmenText
-from tests.slam.logs.kinds import Kind, read_log
 
 MAKE, N, STEP_S = CarmenText(), 40, 0.5
 POSES = MAKE.path_poses(N)
