@@ -4,6 +4,7 @@
 import json
 import stat
 import tomllib
+from codecs import BOM_UTF16_BE, BOM_UTF16_LE
 from pathlib import Path
 from typing import Any
 
@@ -48,11 +49,14 @@ def bytes_of(path: Path, most: int) -> bytes:
 
 
 def text_of(path: Path, most: int) -> str:
-    """The same as text in UTF-8; ``LogFormatError`` where it is none."""
+    """The same as text, in UTF-8 or as a byte-order mark says; ``LogFormatError`` for no text."""
+    data = bytes_of(path, most)
+    marked = data.startswith((BOM_UTF16_LE, BOM_UTF16_BE))
     try:
-        return bytes_of(path, most).decode("utf-8")
+        return data.decode("utf-16" if marked else "utf-8-sig")
     except UnicodeDecodeError as error:
-        raise LogFormatError(path, "not a text file") from error
+        why = f"byte {error.start} is no {error.encoding.upper()}"
+        raise LogFormatError(path, f"not a text file: {why}; save it as UTF-8") from error
 
 
 def toml_of(path: Path, most: int) -> dict[str, Any]:
@@ -61,6 +65,39 @@ def toml_of(path: Path, most: int) -> dict[str, Any]:
         return tomllib.loads(text_of(path, most))
     except (ValueError, RecursionError) as error:  # a number of too many digits, too
         raise LogFormatError(path, f"is no TOML: {error}") from error
+
+
+def yaml_in(path: Path, text: str, what: str) -> dict[str, str | list[str | None] | None]:
+    """The fields of a YAML document, which may be JSON, every value as its text.
+
+    Lists hold values alone. None is what is nested deeper: it is never built, so no tag has a
+    meaning and no alias makes the text more than it is. ``LogFormatError`` for what is no ``what``.
+    """
+    from ruamel.yaml import YAML, MappingNode, ScalarNode, SequenceNode
+    from ruamel.yaml.error import YAMLError
+
+    def plain(node: object) -> str | None:
+        return node.value if isinstance(node, ScalarNode) else None
+
+    try:
+        # the library takes no tabs between words, as YAML and map_server do
+        root = YAML(typ="base", pure=True).compose(text.replace("\t", " "))
+    except (YAMLError, ValueError, ArithmeticError, AssertionError, RecursionError) as error:
+        mark = getattr(error, "problem_mark", None)
+        said = (getattr(error, "context", None), getattr(error, "problem", None) or error)
+        why = ", ".join(str(words).partition("\n")[0] for words in said if words)
+        raise LogFormatError(path, f"is no YAML: {why:.200}", mark and mark.line + 1) from error
+    if not isinstance(root, MappingNode):
+        raise LogFormatError(path, f"no {what}: expected lines of 'key: value'")
+    found: dict[str, str | list[str | None] | None] = {}
+    for key, value in root.value:
+        name, line = plain(key), key.start_mark.line + 1
+        if name is None or name in found:
+            why = "a key that is no word" if name is None else f"{name!r:.80} twice"
+            raise LogFormatError(path, f"no {what}: it has {why}", line)
+        several = isinstance(value, SequenceNode)
+        found[name] = [plain(each) for each in value.value] if several else plain(value)
+    return found
 
 
 def json_of(path: Path, most: int, what: str, *, strict: bool = True) -> dict[str, Any]:

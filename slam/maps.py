@@ -2,23 +2,23 @@
 """Maps as files: PGM + YAML as the map_server of ROS 1 and nav2 loads them, and as a picture."""
 
 import hashlib
+import logging
 import os
 import re
 import shutil
-import warnings
-from io import BytesIO
 from pathlib import Path
-from typing import Any
 
 import numpy as np
-from numpy.typing import NDArray
 
 from slam import inputs
 from slam.arrays import Bools, Bytes, Float32
-from slam.bounded import bytes_of, text_of
+from slam.bounded import bytes_of, text_of, yaml_in
 from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Raster
 from slam.files import part_of, put, replacing, sync, sync_names, unfinished
+from slam.map_image import MAX_HEADER_BYTES, pixels_of
+
+_log = logging.getLogger(__name__)
 
 OCCUPIED_THRESHOLD = 0.65
 # ROS 1's value. nav2's map_saver writes 0.25, with which a map_server takes the unknown gray 205
@@ -27,17 +27,15 @@ FREE_THRESHOLD = 0.196
 OCCUPIED, UNKNOWN, FREE = 0, 205, 254
 
 MODES = ("trinary", "scale", "raw")
+Fields = dict[str, str | list[str | None] | None]
+_YES, _NO = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
 
 _UNKNOWN_RGB = (176, 180, 184)
 _STOPS = np.array([0.0, 0.5, 1.0])  # of existence: free paper, doubtful amber, solid ink
 _STOPS_RGB = np.array([[252, 250, 245], [233, 160, 76], [22, 33, 58]], dtype=np.float64)
-_GAP = rb"\s+(?:#[^\n]*\n\s*)*"  # PGM allows comments between the words of its header
-_PGM_HEADER = re.compile(rb"P5" + _GAP + rb"(\d+)" + _GAP + rb"(\d+)" + _GAP + rb"255\s")
-_MAX_HEADER_BYTES = 4096
 MAX_PIXELS = 1 << 28  # 490 m square at 3 cm cells
 MAX_CELL_M, MIN_CELL_M = 1e3, 1e-4  # edge of a cell
 MAX_ORIGIN = 1e8  # m, rad; beyond, a float has no room for cells
-MAX_PNG_PIXELS = 178_956_970  # what Pillow unpacks, four bytes each
 _MAX_YAML_BYTES = 1 << 16
 _EDITED = ": the sum differs (after a change on purpose, delete the two lines of sums in the YAML)"
 _IMAGE_SUM, _FIELDS_SUM = "sha256 of the image:", "sha256 of the lines below:"
@@ -123,10 +121,11 @@ def _kept(pgm: Path) -> Path:
 def read_map(yaml: Path, *, saved: bool = False, most_pixels: int = MAX_PIXELS) -> Raster:
     """The raster of a map_server YAML file: 1 occupied, 0 free, NaN unknown.
 
-    Reads binary PGM and PNG images in the modes trinary, scale (between the thresholds in
-    proportion) and raw (0 to 100). Raises ``LogFormatError`` naming the file when one of the two is
-    missing, wrong, too large, or not what the sums of ``write_map`` say; files without these sums
-    are read as they are.
+    Reads any YAML, and images as ``slam.map_image`` does, in the modes trinary, scale (between the
+    thresholds in proportion) and raw (0 to 100). What is above ``occupied_thresh`` is occupied,
+    else below ``free_thresh`` free, else unknown; a warning says where the two are crossed. Raises
+    ``LogFormatError`` naming the file when one of the two is missing, wrong, too large, or not what
+    the sums of ``write_map`` say; files without these sums are read as they are.
 
     most_pixels  of the image
     saved  take the gray 205, which every map_saver writes for unknown, for unknown, though nav2's
@@ -134,13 +133,13 @@ def read_map(yaml: Path, *, saved: bool = False, most_pixels: int = MAX_PIXELS) 
     """
     text = text_of(yaml, _MAX_YAML_BYTES)
     image_sum = _checked_sums(yaml, text)
-    fields = _yaml_fields(yaml, text)
+    fields = yaml_in(yaml, text, "map of map_server")
     resolution = _numbers(yaml, fields, "resolution", 1, MIN_CELL_M, MAX_CELL_M)[0]
     origin = _numbers(yaml, fields, "origin", 3, -MAX_ORIGIN, MAX_ORIGIN)
-    mode = fields.get("mode", "trinary")
+    mode = _word(yaml, fields, "mode", "trinary").lower()
     if mode not in MODES:
-        raise LogFormatError(yaml, f"mode must be one of {', '.join(MODES)}, got {mode!r:.80}")
-    gray, opaque = _read_image(yaml.parent / _field(yaml, fields, "image"), image_sum, most_pixels)
+        raise LogFormatError(yaml, f"mode must be one of {', '.join(MODES)}, got {_said(mode)}")
+    gray, opaque = _read_image(yaml.parent / _word(yaml, fields, "image"), image_sum, most_pixels)
     meant = _meaning(yaml, fields, mode)
     if saved and mode != "raw":
         meant[UNKNOWN] = np.nan
@@ -153,18 +152,24 @@ def read_map(yaml: Path, *, saved: bool = False, most_pixels: int = MAX_PIXELS) 
         raise LogFormatError(yaml, str(error)) from error
 
 
-def _meaning(yaml: Path, fields: dict[str, str], mode: str) -> Float32:
+def _meaning(yaml: Path, fields: Fields, mode: str) -> Float32:
     """Of each gray: (256,) how likely it is occupied, NaN for unknown."""
     grays = np.arange(256)
     if mode == "raw":
         return np.where(grays <= 100, grays / 100.0, np.nan).astype(np.float32)
-    negate = fields.get("negate", "0").lower() in ("1", "true")
-    occupancy = grays / 255.0 if negate else (255 - grays) / 255.0
+    negate = _word(yaml, fields, "negate", "0").lower()
+    if negate not in (*_YES, *_NO):
+        raise LogFormatError(yaml, f"negate must be 0 or 1, got {_said(negate)}")
+    occupancy = grays / 255.0 if negate in _YES else (255 - grays) / 255.0
     high = _numbers(yaml, fields, "occupied_thresh", 1, -100.0, 100.0)[0]
     low = _numbers(yaml, fields, "free_thresh", 1, -100.0, 100.0)[0]
-    if not low < high:
-        raise LogFormatError(yaml, f"free_thresh must be < occupied_thresh, got {low} and {high}")
-    between = (occupancy - low) / (high - low) if mode == "scale" else np.nan
+    if low > high:
+        _log.warning(
+            "%s: free_thresh %g lies above occupied_thresh %g: what is between is occupied",
+            yaml, low, high,
+        )  # fmt: skip
+    scale = mode == "scale" and low < high
+    between = (occupancy - low) / (high - low) if scale else np.nan
     meant = np.where(occupancy > high, 1.0, np.where(occupancy < low, 0.0, between))
     return meant.astype(np.float32)
 
@@ -190,38 +195,41 @@ def _plain(value: float) -> str:
     return np.format_float_positional(value, trim="0")
 
 
-def _yaml_fields(yaml: Path, text: str) -> dict[str, str]:
-    """``key: value`` lines; a map_server file has no deeper structure but one bracketed list."""
-    fields: dict[str, str] = {}
-    for number, line in enumerate(text.splitlines(), 1):
-        content = re.sub(r"(^|\s)#.*", "", line).strip()
-        if not content or content == "---":
-            continue
-        key, colon, value = content.partition(":")
-        if not colon:
-            raise LogFormatError(yaml, f"expected 'key: value', got {content[:40]!r}", number)
-        fields[key.strip()] = value.strip().strip("'\"")
-    return fields
-
-
-def _field(yaml: Path, fields: dict[str, str], key: str) -> str:
-    if not fields.get(key):
-        raise LogFormatError(yaml, f"has no {key}")
-    return fields[key]
+def _word(yaml: Path, fields: Fields, key: str, otherwise: str = "") -> str:
+    value = fields.get(key, otherwise)
+    if value == "":
+        value = otherwise
+    if value == "":
+        raise LogFormatError(yaml, f"has no {key}, which a map_server needs")
+    if not isinstance(value, str):
+        raise LogFormatError(yaml, f"{key} must be one value, got {_said(value)}")
+    return value.strip()
 
 
 def _numbers(
-    yaml: Path, fields: dict[str, str], key: str, count: int, low: float, high: float
+    yaml: Path, fields: Fields, key: str, count: int, low: float, high: float
 ) -> list[float]:
-    text = _field(yaml, fields, key)
+    given = fields.get(key)
+    if isinstance(given, list):
+        words = [word or "" for word in given]
+    else:
+        words = _word(yaml, fields, key).strip("[]").split(",")  # a list in quotes
     try:
-        values = [float(word) for word in text.strip("[]").split(",")]
-    except ValueError as error:
-        raise LogFormatError(yaml, f"{key}: {error}") from error
+        values = [float(word) for word in words]
+    except ValueError:
+        values = []
     if len(values) != count or not all(low <= value <= high for value in values):
         what = "a number" if count == 1 else f"{count} numbers"
-        raise LogFormatError(yaml, f"{key} must be {what} from {low:g} to {high:g}, got {text:.80}")
+        got = _said(fields[key])
+        raise LogFormatError(yaml, f"{key} must be {what} from {low:g} to {high:g}, got {got}")
     return values
+
+
+def _said(value: str | list[str | None] | None) -> str:
+    """A field's value for a message."""
+    if isinstance(value, list):
+        value = f"[{', '.join(word or 'a list or fields' for word in value[:9])}]"
+    return value[:80] if value is not None else "fields"
 
 
 def has_sums(yaml: Path) -> bool:
@@ -247,45 +255,8 @@ def _sha256(data: bytes) -> str:
 
 def _read_image(path: Path, image_sum: str | None, most: int) -> tuple[Bytes, Bools | None]:
     """Gray values, and which pixels are opaque where the image says so."""
-    data = bytes_of(path, most + _MAX_HEADER_BYTES)
+    data = bytes_of(path, most + MAX_HEADER_BYTES)
     inputs.note(path)
     if image_sum is not None and _sha256(data) != image_sum:
         raise LogFormatError(path, f"is not the image that was written{_EDITED}")
-    if data.startswith(b"\x89PNG"):
-        return _png(path, data, min(most, MAX_PNG_PIXELS))
-    header = _PGM_HEADER.match(data[:_MAX_HEADER_BYTES])
-    if header is None:
-        raise LogFormatError(path, "no PNG, and not a binary PGM image of 8 bits (P5, maximum 255)")
-    width, height = int(header[1][:9]), int(header[2][:9])
-    pixels: NDArray[Any] = np.frombuffer(data, dtype=np.uint8, offset=header.end())
-    if not 0 < width * height <= most or len(pixels) != width * height:
-        raise LogFormatError(path, f"{width} x {height} pixels expected, found {len(pixels)}")
-    return pixels.reshape(height, width), None
-
-
-def _png(path: Path, data: bytes, most: int) -> tuple[Bytes, Bools | None]:
-    """The mean of its colours, as a map_server takes it."""
-    from PIL import Image, UnidentifiedImageError
-
-    width, height = (int.from_bytes(data[at : at + 4], "big") for at in (16, 20))  # of its IHDR
-    if data[12:16] == b"IHDR" and width * height > most:
-        raise LogFormatError(
-            path, f"{width} x {height} pixels, at most {most} are allowed in a PNG"
-        )
-    try:
-        with warnings.catch_warnings():
-            warnings.simplefilter("ignore", Image.DecompressionBombWarning)  # half of that
-            image = Image.open(BytesIO(data), formats=["PNG"])
-        with image:
-            if image.mode.startswith("I"):
-                raise LogFormatError(path, "16 bits a pixel, expected 8")
-            if image.mode == "P" and image.palette is None:
-                raise LogFormatError(path, "no PNG that can be read: its palette is missing")
-            clear = image.has_transparency_data
-            pixels = np.asarray(image.convert("RGBA" if clear else "RGB"))
-    except (  # ValueError: of its texts and of its lengths
-        Image.DecompressionBombError, UnidentifiedImageError, OSError, SyntaxError, ValueError
-    ) as error:  # fmt: skip
-        raise LogFormatError(path, f"no PNG that can be read: {error}") from error
-    gray = (pixels[..., :3].sum(axis=2, dtype=np.uint16) // 3).astype(np.uint8)
-    return gray, pixels[..., 3] > 127 if clear else None
+    return pixels_of(path, data, most)

@@ -17,12 +17,14 @@ Mask = NDArray[np.bool_]
 Rect = tuple[float, float, float, float]
 Point = tuple[float, float]
 
-ROBOT_M = 0.36  # from the robot's middle to what it must not touch, as in ``scenes.arrangement``
-START_M, GOAL_M = 0.7, 0.6  # of floor round the robot's start, round a spot to visit
+ROBOT_M = 0.26  # radius of the scenes' own robot
+MARGIN_M = 0.1  # from a robot to what it must not touch, as in ``scenes.arrangement``
+GOAL_M = 0.6  # of floor round a spot to visit, of the scenes' own robot
 ROOM_M = 0.65  # half the width of floor that is no passage
-GOALS_M = 4.0  # from one spot to visit to the next, at least
+GOALS_M = 4.0  # from one spot to visit to the next, at least; less on floor of under 64 m2
 MAX_GOALS = 20
 LEAST_M2 = 2.0  # of floor that the robot can reach
+ANOTHER = "where a smaller one drives, say so by FromMap.robot_m; "
 WALLED = 0.4  # share of a room's edge that is wall
 CELL_M = 0.1  # on which rooms are cut into rectangles
 RECT_M = 0.4  # least side of such a rectangle
@@ -49,22 +51,24 @@ def clearance(free: Mask, cell_m: float) -> Float:
     return np.asarray(np.maximum(far.astype(np.float64) - 0.5, 0.0) * cell_m)
 
 
-def reachable(clear: Float, at: tuple[int, int]) -> Mask:
-    """Cells that the robot's middle can get to from a cell."""
-    _, labels = cv2.connectedComponents((clear >= ROBOT_M).astype(np.uint8), connectivity=4)
+def reachable(clear: Float, at: tuple[int, int], robot_m: float) -> Mask:
+    """Cells that the middle of a robot of that radius can get to from a cell."""
+    wide = (clear >= robot_m + MARGIN_M).astype(np.uint8)
+    _, labels = cv2.connectedComponents(wide, connectivity=4)
     return np.asarray(labels == labels[at]) if labels[at] else np.zeros(clear.shape, dtype=bool)
 
 
-def start_cell(clear: Float, wanted: tuple[int, int] | None, source: str) -> tuple[int, int]:
+def start_cell(
+    clear: Float, wanted: tuple[int, int] | None, robot_m: float, source: str
+) -> tuple[int, int]:
     """Where the robot starts: there if there is room, else the middle of the largest floor."""
-    if wanted is not None and clear[wanted] >= ROBOT_M:
+    wide = clear >= robot_m + MARGIN_M
+    if wanted is not None and wide[wanted]:
         return wanted
-    n, labels, stats, _ = cv2.connectedComponentsWithStats(
-        (clear >= ROBOT_M).astype(np.uint8), connectivity=4
-    )
+    n, labels, stats, _ = cv2.connectedComponentsWithStats(wide.astype(np.uint8), connectivity=4)
     if n < 2:
         raise InvalidValueError(
-            f"{source}: no free floor where a robot of {ROBOT_M} m radius has room; expected rooms "
+            f"{source}: no free floor where {in_words(robot_m)} has room; {ANOTHER}expected rooms "
             "of free cells inside walls of occupied ones (is it a map, are its thresholds right?)"
         )
     largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA]))
@@ -73,16 +77,22 @@ def start_cell(clear: Float, wanted: tuple[int, int] | None, source: str) -> tup
     return int(row), int(column)
 
 
+def in_words(robot_m: float) -> str:
+    """A robot as errors call it."""
+    return f"a robot of {robot_m:.3g} m radius, {MARGIN_M:g} m from all walls,"
+
+
 def spots(
-    clear: Float, floor: Mask, first: tuple[int, int], cell_m: float
+    clear: Float, floor: Mask, first: tuple[int, int], cell_m: float, robot_m: float = ROBOT_M
 ) -> list[tuple[int, int]]:
     """Cells to visit, wide places first, each some metres from the others and from the start."""
-    left = np.where(floor & (clear >= GOAL_M), np.minimum(clear, 2.0), 0.0)
+    left = np.where(floor & (clear >= GOAL_M - (ROBOT_M - robot_m)), np.minimum(clear, 2.0), 0.0)
     if not left.any():
         left = np.where(floor, clear, 0.0)
     found: list[tuple[int, int]] = []
     area = float(floor.sum()) * cell_m * cell_m
-    away = round(max(GOALS_M, math.sqrt(area / MAX_GOALS)) / cell_m)
+    apart = min(max(GOALS_M, math.sqrt(area / MAX_GOALS)), 0.5 * math.sqrt(area))
+    away = round(apart / cell_m)
     _clear_around(left, first, away // 2)
     while len(found) < MAX_GOALS and left.any():
         row, column = np.unravel_index(int(np.argmax(left)), left.shape)

@@ -8,7 +8,7 @@ import cv2
 import numpy as np
 from numpy.typing import NDArray
 
-from scenes.from_map.floor import Passage, Point, Rect
+from scenes.from_map.floor import ROBOT_M, Passage, Point, Rect
 from scenes.from_map.survey import Cells, Survey, survey
 from scenes.from_map.things import Thing, things_of
 from scenes.from_map.walls import MAX_WALL_M, MOST_WALLS, boxes_of, skin
@@ -41,6 +41,7 @@ class FromMap:
     tolerance_m  by which a straightened wall may miss the middle of its cells
     start        x m, y m, heading rad of the robot in the map; None: the map's origin where there
                  is room, else the widest floor
+    robot_m      radius about its axle of the robot that is to drive there
     path         (n, 2) m where a robot has driven: other floor is that near to it; None: anywhere
     things       whether small things apart from walls are taken out of the walls
     few          whether boxes on one line become one: fewer, a little farther from their cells
@@ -48,6 +49,7 @@ class FromMap:
 
     tolerance_m: float = 0.05
     start: Pose | None = None
+    robot_m: float = ROBOT_M
     path: Float | None = None
     things: bool = True
     few: bool = True
@@ -55,6 +57,8 @@ class FromMap:
     def __post_init__(self) -> None:
         if not 0.01 <= self.tolerance_m <= 0.5:
             raise InvalidValueError(f"tolerance_m must lie in 0.01..0.5, got {self.tolerance_m}")
+        if not 0.01 <= self.robot_m <= 3.0:
+            raise InvalidValueError(f"FromMap.robot_m must lie in 0.01..3, got {self.robot_m}")
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -118,7 +122,7 @@ def plan(map_: Raster, options: FromMap | None = None, *, source: str = "map") -
     cells = Cells(map_.values.shape, cell, T_map_cells)
     floor = survey(
         cells, cells.mostly(free | (occupied & ~solid)), walls, boxes,
-        start=options.start, path=options.path, source=source,
+        start=options.start, path=options.path, robot_m=options.robot_m, source=source,
     )  # fmt: skip
     check_span(source, bounds_of(floor.rooms))
     return MapPlan(

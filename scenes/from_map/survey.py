@@ -53,20 +53,21 @@ def survey(  # noqa: PLR0913 (what is known of a building)
     *,
     start: Pose | None = None,
     path: Float | None = None,
+    robot_m: float = floors.ROBOT_M,
     source: str = "map",
 ) -> Survey:
     """The floor of a building.
 
     free           which cells are free floor
     walls, things  (n, 5) boxes in the frame of the cells; things stand on floor
-    start, path    as in ``FromMap``
+    start, path, robot_m  as in ``FromMap``
     Raises ``InvalidValueError`` where there is no floor for a robot.
     """
     built, leak = cells.raster(walls), 0.5 * LEAK_M / cells.cell_m
     ground = _filled(free, cells) & ~built
     passable = ~built & ~cells.raster(things)
     if path is not None:
-        driven = cells.beside(path, floors.ROBOT_M + 2.0 * cells.cell_m)
+        driven = cells.beside(path, robot_m + floors.MARGIN_M + 2.0 * cells.cell_m)
         ground, passable = ground | driven, passable | driven
         wide = floors.clearance(ground, cells.cell_m) >= 0.5 * LEAK_M
         ground &= _away(cells.reached(driven, wide | driven, NEAR_PATH_M)) <= leak
@@ -81,13 +82,13 @@ def survey(  # noqa: PLR0913 (what is known of a building)
         outdoors -= set(np.unique(labels[cells.beside(path, 0.0)]).tolist())
     ground &= ~np.isin(labels, sorted(outdoors))
     passable_m = floors.clearance(ground & passable, cells.cell_m)
-    begin = floors.start_cell(passable_m, cells.at(start), source)
-    reach = floors.reachable(passable_m, begin)
+    begin = floors.start_cell(passable_m, cells.at(start), robot_m, source)
+    reach = floors.reachable(passable_m, begin, robot_m)
     area = float(reach.sum()) * cells.cell_m**2
     if area < floors.LEAST_M2:
         raise InvalidValueError(
-            f"{source}: the robot can reach {area:.1f} m2 of floor only, expected at least "
-            f"{floors.LEAST_M2:g} m2 (is it a map of rooms, or noise?)"
+            f"{source}: {floors.in_words(robot_m)} can reach {area:.1f} m2 of floor only, expected "
+            f"at least {floors.LEAST_M2:g} m2; {floors.ANOTHER}is it a map of rooms, or noise?"
         )
     labels[~(ground & (_away(reach) * cells.cell_m <= floors.ROOM_M))] = 0  # not beside its ways
     gaps = [
@@ -96,16 +97,20 @@ def survey(  # noqa: PLR0913 (what is known of a building)
         if DOOR_M[0] <= gap.wide_m <= DOOR_M[1]
     ]
     away = reach & ~_beside([gap.at for gap in gaps], cells)
-    found = floors.spots(passable_m, away if away.any() else reach, begin, cells.cell_m)
+    found = floors.spots(passable_m, away if away.any() else reach, begin, cells.cell_m, robot_m)
     spots = cells.points([begin, *found])
-    rooms = _rooms(labels, cells.cell_m, cells.T_map_cells, source)
+    least_m = floors.RECT_M * min(1.0, robot_m / floors.ROBOT_M)
+    rooms = _rooms(labels, cells, least_m, source)
     x, y = start[:2] if start is not None else spots[0]
-    if not any(a <= x <= c and b <= y <= d for own in rooms.values() for a, b, c, d in own):
-        half = math.sqrt(0.5) * floors.ROBOT_M  # in a corner that the rectangles leave out
+    goals = [spot for spot in spots[1:] if _inside(spot, rooms)] or spots[1:]
+    if not _inside((x, y), rooms):
+        half = math.sqrt(0.5) * (
+            robot_m + floors.MARGIN_M
+        )  # in a corner that the rectangles leave out
         rooms["start"] = ((x - half, y - half, x + half, y + half),)
     return Survey(
         start=start or (*spots[0], 0.0),
-        goals=tuple(spots[1:]),
+        goals=tuple(goals),
         rooms=rooms,
         gaps=tuple(replace(gap, at=cells.in_map(gap.at)) for gap in gaps),
         area_m2=area,
@@ -180,6 +185,11 @@ class Cells:
         return np.floor(at[:, ::-1] / self.cell_m).astype(np.int64)
 
 
+def _inside(at: Point, rooms: dict[str, tuple[Rect, ...]]) -> bool:
+    x, y = at
+    return any(a <= x <= c and b <= y <= d for own in rooms.values() for a, b, c, d in own)
+
+
 def raster_of(boxes: Float, shape: tuple[int, ...], cell_m: float) -> NDArray[np.bool_]:
     """Which cells a box touches."""
     cells = np.zeros(shape, dtype=np.uint8)
@@ -225,11 +235,12 @@ def _outside(walls: Mask, cells: Cells) -> Mask:
 
 
 def _rooms(
-    labels: NDArray[np.int32], cell_m: float, T_map_cells: Float, source: str
+    labels: NDArray[np.int32], cells: Cells, least_m: float, source: str
 ) -> dict[str, tuple[Rect, ...]]:
     """Rectangles along the axes of the map, of floor that is all of one room."""
     from scipy.ndimage import find_objects
 
+    cell_m, T_map_cells = cells.cell_m, cells.T_map_cells
     height, width = labels.shape
     low, high = _corners((0, 0, width, height), cell_m, T_map_cells)
     at_x, at_y = (np.flatnonzero(labels.any(axis=axis)) for axis in (0, 1))
@@ -256,7 +267,7 @@ def _rooms(
         if n_rects >= floors.MAX_RECTS:
             break
         own = coarse[window] == label if window else np.zeros((0, 0), dtype=bool)
-        rects = floors.rectangles(own, round(floors.RECT_M / step), floors.ROOM_RECTS, 0.9)
+        rects = floors.rectangles(own, round(least_m / step), floors.ROOM_RECTS, 0.9)
         if not rects:
             continue
         n_rects += len(rects)

@@ -51,7 +51,9 @@ def mjcf(plan: MapPlan, name: str) -> str:
     return "\n".join([*lines, "  </worldbody>", "</mujoco>", ""])
 
 
-def recipe(plan: MapPlan, plan_file: str, *, furniture: str, doors: str, made_of: str) -> str:
+def recipe(
+    plan: MapPlan, plan_file: str, *, furniture: str, doors: str, made_of: str, robot: str = ""
+) -> str:
     """The TOML file by which the scene is named: each thing and each door is a line."""
     one_line = "".join(c if c.isprintable() else "?" for c in made_of)
     lines = [
@@ -89,7 +91,7 @@ def recipe(plan: MapPlan, plan_file: str, *, furniture: str, doors: str, made_of
             f'  [{_n(x - half * c, y - half * s, sep=", ")}, {_degrees(yaw)}, "left"],'
             f"  # a gap of {gap.wide_m:.2f} m"
         )
-    return "\n".join([*lines, "]", ""])
+    return "\n".join([*lines, "]", *([robot] if robot else []), ""])
 
 
 def write(
@@ -99,18 +101,22 @@ def write(
     furniture: str = "move",
     doors: str = "open",
     made_of: str = "a map",
+    robot: str = "",
 ) -> Path:
     """``<stem>.xml`` and ``<stem>.toml``; returns the latter, the name of the scene.
 
     furniture  what becomes of small things: "move", "keep" or "drop"
     doors      how they rest; "none" leaves the gaps open
+    robot      lines of TOML that say which one drives there, if not the scenes' own
     """
     plan_file = stem.with_name(stem.name + ".xml")
     write_text(plan_file, mjcf(plan, stem.name))
     file = stem.with_name(stem.name + ".toml")
     write_text(
         file,
-        recipe(plan, plan_file.name, furniture=furniture, doors=doors, made_of=made_of),
+        recipe(
+            plan, plan_file.name, furniture=furniture, doors=doors, made_of=made_of, robot=robot
+        ),
     )
     return file
 

@@ -48,14 +48,17 @@ PX = 1400
 FONT = cv2.FONT_HERSHEY_SIMPLEX
 
 
-def problems(scene: Scene) -> Iterator[str]:
-    """Each a sentence that names the mark; none for a scene that is as it should be."""
+def problems(scene: Scene, robot_m: float = TourConfig().robot_radius_m) -> Iterator[str]:
+    """Each a sentence that names the mark; none for a scene that is as it should be.
+
+    robot_m  what the robot keeps clear about its axle
+    """
     rooms = list(scene.rooms.values())
     inside = {
         name: any(a <= x <= c and b <= y <= d for a, b, c, d in rooms)
         for name, (x, y) in scene.goals.items()
     }
-    grid = NavGrid(_wider(scene, 1.0), scene.obstacles, TourConfig().robot_radius_m - 0.05)
+    grid = NavGrid(_wider(scene, 1.0), scene.obstacles, robot_m - 0.05)
     costs = grid.cost_to(np.array(scene.start[:2]))
     hinges = [scene.initial[m.name] for m in scene.movers if m.kind == "door"]
     for name, (x, y) in scene.goals.items():
@@ -280,6 +283,7 @@ def made(  # noqa: PLR0913 (by keyword)
     source: str,
     furniture: str = "move",
     doors: str = "open",
+    robot: str = "",
     overwrite: bool = False,
 ) -> Made:
     """Write STEM.toml, STEM.xml and STEM.png.
@@ -292,7 +296,7 @@ def made(  # noqa: PLR0913 (by keyword)
     stem.parent.mkdir(parents=True, exist_ok=True)
     with replacing(picture) as new:
         imageio.imwrite(new, over_map(map_, drawn), format="png")
-    toml = write(drawn, stem, furniture=furniture, doors=doors, made_of=source)
+    toml = write(drawn, stem, furniture=furniture, doors=doors, made_of=source, robot=robot)
     return Made(files=(toml, toml.with_suffix(".xml"), picture), plan=drawn)
 
 

@@ -25,6 +25,12 @@ scene = typer.Typer(help="Make a scene of a map or a log, show it, check it.", n
 OUT = partial(option, "STEM of STEM.toml, .xml and .png.", writes=True)
 WHICH = partial(argument, "A scene by name, module:function, or its file.", REQUIRED)
 TOLERANCE = partial(option, "m by which a straightened wall may miss the middle of its cells.")
+ROBOT = partial(
+    option,
+    "The robot that drives there: a name or TOML file as of run, or a radius in m (a "
+    "pioneer3dx of that size).",
+    fills=("FromMap.robot_m",),
+)
 
 
 @spec
@@ -59,9 +65,10 @@ class OfMap:
     [bold]mobilia scene from-map map.yaml[/bold]
     """
 
-    map_yaml: Path = argument("A map_server YAML file, its PGM or PNG beside it.", REQUIRED)
+    map_yaml: Path = argument("A map_server YAML file, its image beside it.", REQUIRED)
     out: Path | None = OUT()
     parts: Parts = part(Parts)
+    robot: str | None = ROBOT()
     start: str | None = option("Where the robot starts in the map: x,y or x,y,degrees.")
     tolerance: float = TOLERANCE(0.05)
     overwrite: bool = options.OVERWRITE()
@@ -69,13 +76,16 @@ class OfMap:
     def __call__(self) -> None:
         from scenes.from_map import FromMap
         from scripts.scene.make import of_file
+        from scripts.scene.robot import robot_of
 
-        how = FromMap(tolerance_m=self.tolerance, start=_start(self.start))
+        robot_m, robot = robot_of(self.robot)
+        start = _start(self.start)
+        how = FromMap(tolerance_m=self.tolerance, start=start, robot_m=robot_m)
         with working(f"reading {self.map_yaml.name}"):
             raster = of_file(self.map_yaml)
         self.parts.make(
             raster, how, self.out or Path(self.map_yaml.stem), source=self.map_yaml.name,
-            overwrite=self.overwrite,
+            robot=robot, overwrite=self.overwrite,
         )  # fmt: skip
 
 
@@ -90,6 +100,7 @@ class OfLog:
     out: Path | None = OUT()
     slam: str = option("The SLAM that makes the map.", "shunting", complete=SLAMS)
     parts: Parts = part(Parts)
+    robot: str | None = ROBOT()
     tolerance: float = TOLERANCE(0.05)
     strict: bool = options.STRICT()
     overwrite: bool = options.OVERWRITE()
@@ -98,14 +109,17 @@ class OfLog:
         check_names([self.slam])
         from scenes.from_map import FromMap
         from scripts.scene.make import of_log
+        from scripts.scene.robot import robot_of
 
+        robot_m, robot = robot_of(self.robot)
         with working(f"{self.slam} maps {self.log.name}"):
             raster, poses = of_log(self.log, self.slam, strict=self.strict)
         x, y, heading = poses[0].tolist()
-        how = FromMap(tolerance_m=self.tolerance, start=(x, y, heading), path=poses[:, :2])
+        start, path = (x, y, heading), poses[:, :2]
+        how = FromMap(tolerance_m=self.tolerance, start=start, path=path, robot_m=robot_m)
         self.parts.make(
             raster, how, self.out or Path(run_name(self.log)), source=self.log.name,
-            overwrite=self.overwrite,
+            robot=robot, overwrite=self.overwrite,
         )  # fmt: skip
 
 
@@ -152,10 +166,13 @@ class Check:
         check_names([], self.which)
         import scenes
         from scripts.scene.make import problems
+        from sim.driving.pilot import tour_of
         from sim.simulation import Simulation
 
-        Simulation(self.which, seed=self.seed).observe()  # raises what ``run`` would
-        found = list(problems(scenes.build(self.which, self.seed)))
+        seen = Simulation(self.which, seed=self.seed)
+        seen.observe()  # raises what ``run`` would
+        tour = tour_of(seen.world.robot)
+        found = list(problems(scenes.build(self.which, self.seed), tour.robot_radius_m))
         for problem in found:
             fact(f"{self.which}: {problem}", bad=True)
         if found:

@@ -3,6 +3,7 @@
 
 import math
 import struct
+import zlib
 from dataclasses import replace
 
 import mujoco
@@ -12,9 +13,13 @@ import pytest
 import scenes
 from scenes.from_map import FromMap, plan, write
 from scenes.placement import gap_to_boxes
-from scripts.scene.make import of_file
+from scripts.scene.make import of_file, problems
+from scripts.scene.robot import robot_of
+from sim.driving.pilot import tour_of
+from sim.simulation import Simulation
+from sim.world.robots import FOLDER
 from slam import se2
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import InvalidValueError, LogFormatError, MobiliaError
 from slam.estimate import Raster
 
 CELL = 0.05
@@ -94,6 +99,53 @@ def test_what_a_robot_drove_through_is_no_thing():
     raster = two_rooms()
     path = np.array([[-1.0, 4.7], [1.5, 4.7], [1.5, 1.5]])
     assert plan(raster, FromMap(path=path)).things == ()
+
+
+def small_world() -> Raster:
+    """A room of 3.8 m with nine posts 1.1 m apart."""
+    values = np.full((100, 100), np.nan, dtype=np.float32)
+    y, x = (np.mgrid[:100, :100] - 49.5) * CELL
+    out = np.maximum(abs(x), abs(y))
+    values[out < 1.9] = 0.0
+    values[(out >= 1.9) & (out < 2.0)] = 1.0
+    apart = np.hypot(x - 1.1 * np.clip(np.round(x / 1.1), -1, 1),
+                     y - 1.1 * np.clip(np.round(y / 1.1), -1, 1))  # fmt: skip
+    values[apart < 0.22] = 1.0
+    return Raster(values=values, resolution_m=CELL, T_map_origin=np.zeros(3))
+
+
+def test_where_no_robot_has_room_its_radius_is_named_and_a_smaller_one_drives():
+    said = r"tb: a robot of 0.26 m radius, 0.1 m from all walls, can reach .* FromMap.robot_m"
+    with pytest.raises(InvalidValueError, match=said):
+        plan(small_world(), FromMap(things=False), source="tb")
+    made = plan(small_world(), FromMap(things=False, robot_m=0.12))
+    assert len(made.goals) >= 2
+    with pytest.raises(InvalidValueError, match=r"no free floor where a robot of 2.95 m radius"):
+        plan(two_rooms(), FromMap(robot_m=2.95, things=False, start=(0.0, 0.0, 0.0)))
+    with pytest.raises(InvalidValueError, match=r"FromMap.robot_m must lie in 0.01..3, got nan"):
+        FromMap(robot_m=math.nan)
+
+
+@pytest.mark.parametrize("words", ["turtlebot3", "0.12", "cart.toml"])
+def test_the_robot_of_a_map_drives_in_its_scene(tmp_path, monkeypatch, words):
+    monkeypatch.chdir(tmp_path)
+    (tmp_path / "cart.toml").write_text((FOLDER / "turtlebot3.toml").read_text())
+    radius, lines = robot_of(words)
+    made = plan(small_world(), FromMap(things=False, robot_m=radius))
+    file = write(made, tmp_path / "world", robot=lines)
+    world = Simulation(str(file), seed=1).world
+    assert world.scene.movers[-1].radius == pytest.approx(radius)
+    assert world.robot.name == {"0.12": "pioneer3dx of 0.12 m"}.get(words, "turtlebot3")
+    assert list(problems(scenes.build(str(file)), tour_of(world.robot).robot_radius_m)) == []
+
+
+@pytest.mark.parametrize(
+    ("words", "said"),
+    [("tb4", "no robot is called 'tb4'"), ("9", "radius_m must be"), ("nan", "must be a number")],
+)
+def test_what_is_no_robot_is_refused(words, said):
+    with pytest.raises(MobiliaError, match=said):
+        robot_of(words)
 
 
 @pytest.mark.parametrize("seed", [0, 1])
@@ -176,8 +228,11 @@ def test_a_map_that_no_scene_has_room_for_is_refused(origin, cell, says):
 
 def test_a_picture_of_too_many_pixels_is_not_unpacked(tmp_path):
     size = struct.pack(">2I5B", 13000, 13000, 8, 0, 0, 0, 0)
-    part = struct.pack(">I", len(size)) + b"IHDR" + size
-    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + part + b"\0" * 100)
+    parts = [
+        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+        for kind, data in ((b"IHDR", size), (b"IDAT", b""))
+    ]
+    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
     (tmp_path / "a.yaml").write_text(
         "image: a.png\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\n"
         "free_thresh: 0.2\n"

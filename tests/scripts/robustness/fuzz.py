@@ -91,8 +91,10 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "named": lambda at: scene(at / "lab.toml"),
     "events": lambda at: read_events(at / "events.toml"),
     "robot": lambda at: read_robot(str(at / "robot.toml")),
-    "map": lambda at: plan(of_file(at / "map.yaml"), source="map.yaml"),
-    "png": lambda at: plan(of_file(at / "map.yaml"), source="map.yaml"),
+    **dict.fromkeys(
+        ("map", "png", "bmp", "tif"),
+        lambda at: plan(of_file(at / "map.yaml"), source="map.yaml"),
+    ),
     **dict.fromkeys(LOGS, log),
     "sqlite": lambda at: list(open_log(at)),
     "park": lambda at: list(open_log(at)),

@@ -93,9 +93,14 @@ def maps() -> dict[str, dict[str, str | bytes]]:
     folder.mkdir(parents=True)
     pgm, yaml = write_map(folder / "map", raster)
     text = "".join(line for line in yaml.open() if not line.startswith("#"))
-    Image.open(pgm).save(folder / "map.png")
-    png = {"map.yaml": text.replace(".pgm", ".png"), "map.png": (folder / "map.png").read_bytes()}
-    found = {"map": {"map.yaml": text, "map.pgm": pgm.read_bytes()}, "png": png}
+    found = {"map": {"map.yaml": text, "map.pgm": pgm.read_bytes()}}
+    fields = dict(line.strip().split(": ", 1) for line in text.splitlines())
+    block = text.replace("[", "\n- ").replace(", ", "\n- ").replace("]", "")
+    words = {"png": text, "bmp": block, "tif": json.dumps(fields, indent=1)}
+    for kind, told in words.items():
+        Image.open(pgm).save(folder / f"map.{kind}")
+        image = {f"map.{kind}": (folder / f"map.{kind}").read_bytes()}
+        found[kind] = {"map.yaml": told.replace(".pgm", f".{kind}"), **image}
     shutil.rmtree(folder)
     return found
 
