@@ -25,7 +25,7 @@ from rosbags.typesys.msg import normalize_msgtype
 from ruamel.yaml import YAML
 from ruamel.yaml.error import YAMLError
 
-from slam.bounded import check_file, text_of
+from slam.bounded import beside, check_file, text_of
 from slam.errors import LogFormatError
 from slam.logs import unpacking
 from slam.logs.text import IMPOSSIBLE
@@ -104,10 +104,11 @@ def settled(path: Path, stack: ExitStack) -> tuple[Path, str]:
 
     Nothing is written beside a recording.
     """
-    beside = [Path(f"{path}{s}") for s in _SIDECARS if path.suffix == ".db3"]
-    beside = [file for file in beside if file.exists() and file.stat().st_size]
+    names = [path.name + s for s in _SIDECARS if path.suffix == ".db3"]
+    also = [beside(path, name) for name in names if path.with_name(name).exists()]
+    also = [file for file in also if file.stat().st_size]
     packed = path.suffix == ".zstd"
-    if not packed and not beside:
+    if not packed and not also:
         return path, ""
     folder = Path(stack.enter_context(TemporaryDirectory()))
     copy = folder / path.name.removesuffix(".zstd")
@@ -115,16 +116,16 @@ def settled(path: Path, stack: ExitStack) -> tuple[Path, str]:
         with path.open("rb") as file, copy.open("wb") as out:
             shutil.copyfileobj(unpacking.unpacked(file), out)
         return copy, ""
-    for file in (path, *beside):
-        check_file(file)
-        shutil.copyfile(file, folder / file.name)
+    for part in (path, *also):
+        check_file(part)
+        shutil.copyfile(part, folder / part.name)
     try:
         with closing(sqlite3.connect(copy)) as database:
             database.execute("SELECT count(*) FROM sqlite_master").fetchone()  # undoes a journal
-            pages = database.execute("PRAGMA wal_checkpoint(TRUNCATE)").fetchone()[1]
+            pages = database.execute("PRAGMA wal_checkpoint").fetchone()[1]
     except sqlite3.DatabaseError:
         pages = 0
-    return copy, "" if pages else f"{beside[0].name} has nothing that SQLite can read"
+    return copy, "" if pages else f"{also[0].name} has nothing that SQLite can read"
 
 
 def can_be_cut(path: Path) -> bool:
@@ -207,6 +208,7 @@ def _sqlite(path: Path, wanted: Wanted) -> Iterator[Record]:
     name = f"file:{quote(str(path.resolve()))}?immutable=1"
     with closing(sqlite3.connect(name, uri=True)) as database:
         try:
+            database.execute("PRAGMA writable_schema=ON")  # else a file that was cut is not opened
             topics = {
                 key: (topic, kind)
                 for key, topic, kind in database.execute("SELECT id, name, type FROM topics")

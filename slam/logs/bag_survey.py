@@ -101,8 +101,15 @@ def survey(bag: Bag, topics: Topics, repairs: Repairs) -> Survey:
                 pose = message.pose.pose
                 p, q = pose.position, pose.orientation
                 standing.pose((p.x, p.y, 2.0 * math.atan2(q.z, q.w)))
-    found = Survey(stamps_ns={name: _on_one_clock(name, clocks[name], repairs) for name in clocks})
-    _as_odometry_stepped(found.stamps_ns, clocks, topics)
+    raw = {name: _stamps(name, clock, repairs) for name, clock in clocks.items()}
+    found = Survey(stamps_ns={})
+    for name, clock in clocks.items():
+        repairs.where = f"topic {name}: "
+        elapsed = [0, *(b - a for (_, a), (_, b) in pairwise(clock))]
+        lines = [None] * len(clock)
+        found.stamps_ns[name] = continued(raw[name], lines, repairs, elapsed_ns=elapsed)
+    repairs.where = ""
+    _as_odometry_stepped(found.stamps_ns, raw, topics)
     whole = _whole(shapes)
     if len(whole) < len(shapes):
         why = f"topic {topics.scan}: {len(shapes) - len(whole)} scans without beams or short ones"
@@ -142,25 +149,17 @@ class _Full:
         return self.at > max(MASS * self._all, self._below)
 
 
-def _on_one_clock(topic: str, clock: list[tuple[int, int]], repairs: Repairs) -> list[int]:
-    """The stamps of a topic without steps back of 1 s or more; those that never change, by the log.
-
-    How much time passed while a clock was set back, the time of the log says, unless it was set
-    back with it.
-    """
+def _stamps(topic: str, clock: list[tuple[int, int]], repairs: Repairs) -> list[int]:
+    """The stamps of a topic; those that do not change are replaced by the times of the log."""
     stamps, logged = [stamp for stamp, _ in clock], [log_ns for _, log_ns in clock]
-    repairs.where = f"topic {topic}: "
-    if len(set(stamps)) < len(stamps) / 2 and len(set(logged)) > len(stamps) / 2:
-        repairs.note(STAMPS_SPREAD, "the stamps do not change", None, len(stamps))
-        stamps = logged
-    elapsed = [0, *(b - a for a, b in pairwise(logged))]
-    out = continued(stamps, [None] * len(stamps), repairs, elapsed_ns=elapsed)
-    repairs.where = ""
-    return out
+    if len(set(stamps)) >= len(stamps) / 2 or len(set(logged)) < len(stamps) / 2:
+        return stamps
+    repairs.note(STAMPS_SPREAD, f"topic {topic}: the stamps do not change", None, len(stamps))
+    return logged
 
 
 def _as_odometry_stepped(
-    stamps_ns: dict[str, list[int]], clocks: dict[str, list[tuple[int, int]]], topics: Topics
+    stamps_ns: dict[str, list[int]], raw: dict[str, list[int]], topics: Topics
 ) -> None:
     """Topics whose clock was set back with that of the odometry go on as the odometry goes on.
 
@@ -168,8 +167,7 @@ def _as_odometry_stepped(
     """
 
     def offsets(name: str) -> NDArray[np.int64]:
-        raw = [stamp for stamp, _ in clocks[name]]
-        return np.array(stamps_ns[name], np.int64) - np.array(raw, np.int64)
+        return np.array(stamps_ns[name], np.int64) - np.array(raw[name], np.int64)
 
     if topics.odometry is None:
         return
@@ -218,13 +216,13 @@ def _ranked(
     """Number of a scan message -> its place by time, of those within the time of the odometry."""
     scan, odometry = names
     stamps = stamps_ns[scan]
-    back = sum(stamps[b] < stamps[a] for a, b in pairwise(whole))
-    if back:
-        why = f"topic {scan}: {back} stamps step back by less than 1 s"
-        repairs.note(STAMPS_SORTED, why, None, back)
     first: dict[int, int] = {}
     for k in whole:
         first.setdefault(stamps[k], k)
+    back = sum(b < a for a, b in pairwise(first))
+    if back:
+        why = f"topic {scan}: {back} stamps step back by less than 1 s"
+        repairs.note(STAMPS_SORTED, why, None, back)
     if len(first) < len(whole):
         why = f"topic {scan}: {len(whole) - len(first)} scans with the time of another"
         repairs.note(LEFT_OUT, why, None, len(whole) - len(first))

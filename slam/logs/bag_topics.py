@@ -89,6 +89,9 @@ class Bag:
             files, counts, missing = bag_files.files_of(self.path)
             if not files:
                 raise LogFormatError(self.path, "a bag without a recording (.mcap, .db3) in it")
+            without = self.path.is_dir() and not (self.path / METADATA).exists()
+            if without and files[0].suffix == ".db3":  # an .mcap has an end of its own
+                self._note(NO_END, f"no {METADATA}: its recorder was killed")
             self._files = [self._opened(file, stack) for file in files]
             found: Counter[str] = Counter()
             kinds: dict[str, str] = {}

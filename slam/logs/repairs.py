@@ -41,7 +41,7 @@ WORDS = {
     NO_END: "{} files without an end, of a recorder that was killed, read up to the cut",
     LOST: "{} messages missing that the recording says it has",
     SHORT_SCANS: "{} scans without beams, or of less than half of them, left out",
-    LEFT_OUT: "{} scans outside the time of the odometry left out",
+    LEFT_OUT: "{} scans outside the time of the odometry, or with the time of another, left out",
     AT_RANGE_MAX: "{} returns in a mass exactly at range_max read as none",
     NO_ODOMETRY: "no odometry: {} scans with that of a constant velocity",
 }
