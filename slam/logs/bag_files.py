@@ -107,8 +107,8 @@ def settled(path: Path, stack: ExitStack) -> tuple[Path, str]:
     names = [path.name + s for s in _SIDECARS if path.suffix == ".db3"]
     also = [beside(path, name) for name in names if path.with_name(name).exists()]
     also = [file for file in also if file.stat().st_size]
-    packed = path.suffix == ".zstd"
-    if not packed and not also:
+    packed, torn = path.suffix == ".zstd", _torn_bytes(path)
+    if not (packed or also or torn):
         return path, ""
     folder = Path(stack.enter_context(TemporaryDirectory()))
     copy = folder / path.name.removesuffix(".zstd")
@@ -119,6 +119,9 @@ def settled(path: Path, stack: ExitStack) -> tuple[Path, str]:
     for part in (path, *also):
         check_file(part)
         shutil.copyfile(part, folder / part.name)
+    if not also:
+        os.truncate(copy, path.stat().st_size - torn)
+        return copy, ""
     try:
         with closing(sqlite3.connect(copy)) as database:
             database.execute("SELECT count(*) FROM sqlite_master").fetchone()  # undoes a journal
@@ -126,6 +129,16 @@ def settled(path: Path, stack: ExitStack) -> tuple[Path, str]:
     except sqlite3.DatabaseError:
         pages = 0
     return copy, "" if pages else f"{also[0].name} has nothing that SQLite can read"
+
+
+def _torn_bytes(path: Path) -> int:
+    """Of half a page at the end of a file of SQLite: it would be read as if zeros followed."""
+    with path.open("rb") as file:
+        head = file.read(18)
+    if not head.startswith(_SQLITE):
+        return 0
+    page = int.from_bytes(head[16:], "big")
+    return path.stat().st_size % max(65536 if page == 1 else page, 512)
 
 
 def can_be_cut(path: Path) -> bool:
