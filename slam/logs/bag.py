@@ -252,9 +252,11 @@ def read_bag(
 
     Topics are guessed by type and name unless they are given. Odometry and truth (a PoseStamped or
     Odometry topic with "truth" in its name) are interpolated to the stamp of each scan where none
-    has the very same stamp; scans outside the time of the odometry are dropped, and so are scans
-    whose stamps do not increase (both are counted in the log). ``labels`` reads
-    ``/ground_truth/labels`` of our own recordings, too.
+    has the very same stamp. ``labels`` reads ``/ground_truth/labels`` of our own recordings, too.
+
+    The bag is read once before: what has to be put right (``slam.logs.bag_survey``) is told in one
+    warning, counted in ``metadata.extra`` and refused by ``strict``. Scans whose headers differ are
+    each read by their own.
 
     An accumulated covariance of the odometry becomes that of each increment by the rule of
     ``slam.logs.bag_laser.increment_covariance``, unless the bag has it as it was
