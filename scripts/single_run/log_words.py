@@ -12,7 +12,7 @@ from scripts.film.footage import Footage
 from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import Float, StreamMetadata
 from slam.logs.mounting import Mounting
-from slam.logs.repairs import WORDS
+from slam.logs.repairs import STANDS_STILL, WORDS
 from slam.replay import Track
 
 UNTRUSTED = 1.0 / 3.0  # share of scans: more, and nobody should build on the run
@@ -152,6 +152,9 @@ def distrust(track: Track, footage: Footage, found: Sequence[Mounting]) -> str:
     causes: list[str] = []
     rest: list[str] = []
     metadata = footage.stream.metadata
+    stands = bool(metadata.extra.get(STANDS_STILL))
+    if stands:
+        causes.append("its odometry stands still while scans move")
     if found and not found[0].as_read and found[0].probability > SURE:
         causes.append(f"the scanner is mounted otherwise: {flags(metadata, found[0])}")
     elif not found or found[0].probability <= SURE or not metadata.mounting:
@@ -163,9 +166,9 @@ def distrust(track: Track, footage: Footage, found: Sequence[Mounting]) -> str:
         causes.append("the times of the log, which had to be repaired")
     else:
         rest.append("scans and odometry on different clocks")
-    if not metadata.odometry:
+    if not metadata.odometry and not stands:
         causes.append("the log has no odometry")
-    else:
+    if metadata.odometry:
         rest.append("wheels that slip, or odometry in other units")
     rest.append("a robot that was carried, or a room that moves as a whole")
     told = "; ".join([*causes, *rest])

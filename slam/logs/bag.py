@@ -5,6 +5,7 @@ import logging
 import math
 from collections import deque
 from collections.abc import Iterator
+from dataclasses import replace
 from pathlib import Path
 from typing import Any
 
@@ -25,6 +26,7 @@ from slam.frames import (
     StreamMetadata,
 )
 from slam.logs.bag_laser import Laser, PoseTrack, Stamped, increment_covariance, mounting
+from slam.logs.bag_survey import Survey, stamp_of, survey
 from slam.logs.bag_topics import SCAN, Bag, Topics, choose
 from slam.logs.repairs import NO_ODOMETRY, Repairs
 from slam.logs.ros_numbers import yaw_of
@@ -36,17 +38,20 @@ MOST_POSE_M = 1e9  # from the origin of its frame, which may be that of a map of
 _log = logging.getLogger(__name__)
 
 
-def frames_of(path: Path, topics: Topics, laser: Laser, epoch_ns: int) -> Iterator[Frame]:
+def frames_of(
+    path: Path, topics: Topics, laser: Laser, epoch_ns: int, known: Survey
+) -> Iterator[Frame]:
     """The frames of the bag at ``path``, stamps less ``epoch_ns``.
 
     Raises ``LogFormatError`` for messages that cannot be, and where no scan has odometry.
     """
     names = (topics.scan, topics.odometry, topics.truth, topics.increment, topics.labels)
-    with Bag(path) as bag:
-        assembly = Assembly(topics, laser, epoch_ns)
-        for topic, log_ns, message in bag.messages({name for name in names if name}):
+    with Bag(path, Repairs(path)) as bag:
+        assembly = Assembly(topics, laser, epoch_ns, wait=True)
+        messages = bag.messages({name for name in names if name})
+        for topic, log_ns, message, stamp_ns in known.in_order(messages, topics.scan):
             with about(path, bag.at):
-                assembly.take(topic, log_ns, message)
+                assembly.take(topic, log_ns, message, stamp_ns)
                 ready = assembly.ready(log_ns) if assembly.waiting else []
             yield from ready
         with about(path, "at the end"):
@@ -55,17 +60,12 @@ def frames_of(path: Path, topics: Topics, laser: Laser, epoch_ns: int) -> Iterat
     assembly.report(path)
 
 
-def stamp_of(message: Any, log_ns: int) -> int:
-    """Of the header; drivers that leave it empty get the time of the log."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) or log_ns
-
-
 class Assembly:
-    """Puts together what belongs to one stamp."""
+    """Puts together what belongs to one stamp; ``wait``: odometry comes for sure, if late."""
 
-    def __init__(self, topics: Topics, laser: Laser, epoch_ns: int) -> None:
+    def __init__(self, topics: Topics, laser: Laser, epoch_ns: int, *, wait: bool = False) -> None:
         self._topics, self._laser, self._epoch_ns = topics, laser, epoch_ns
+        self._wait = wait
         self.waiting: deque[tuple[Scan, int]] = deque()  # scans and when they were logged
         self._odometry, self._truth = PoseTrack(), PoseTrack()
         self._increments: dict[int, Float] = {}
@@ -75,9 +75,10 @@ class Assembly:
         self._before_ns: int | None = None  # the scan before, of a bag without odometry
         self._disordered = self._without_odometry = self._given = 0
 
-    def take(self, topic: str, log_ns: int, message: Any) -> None:
-        """One message of one of the topics."""
-        stamp_ns, topics = stamp_of(message, log_ns) - self._epoch_ns, self._topics
+    def take(self, topic: str, log_ns: int, message: Any, stamp_ns: int | None = None) -> None:
+        """One message of one of the topics; ``stamp_ns``: in place of its own."""
+        stamp_ns = stamp_of(message, log_ns) if stamp_ns is None else stamp_ns
+        stamp_ns, topics = stamp_ns - self._epoch_ns, self._topics
         if topic == topics.scan:
             scan = self._laser.scan(message, stamp_ns)
             if self._last_ns is not None and scan.stamp_ns <= self._last_ns:
@@ -103,6 +104,8 @@ class Assembly:
             stamp_ns = scan.stamp_ns
             if not (late or self._complete(stamp_ns)):
                 break
+            if self._wait and now_ns is not None and not self._driven_to(stamp_ns):
+                break
             self.waiting.popleft()
             frame = self._frame(scan)
             if frame is not None:
@@ -112,11 +115,14 @@ class Assembly:
     def _complete(self, stamp_ns: int) -> bool:
         topics = self._topics
         return (
-            (topics.odometry is None or self._odometry.reaches(stamp_ns))
+            self._driven_to(stamp_ns)
             and (topics.truth is None or self._truth.reaches(stamp_ns))
             and (topics.labels is None or stamp_ns in self._labels)
             and (topics.increment is None or stamp_ns in self._increments)
         )
+
+    def _driven_to(self, stamp_ns: int) -> bool:
+        return self._topics.odometry is None or self._odometry.reaches(stamp_ns)
 
     def _frame(self, scan: Scan) -> Frame | None:
         stamp_ns = scan.stamp_ns
@@ -246,9 +252,11 @@ def read_bag(
 
     Topics are guessed by type and name unless they are given. Odometry and truth (a PoseStamped or
     Odometry topic with "truth" in its name) are interpolated to the stamp of each scan where none
-    has the very same stamp; scans outside the time of the odometry are dropped, and so are scans
-    whose stamps do not increase (both are counted in the log). ``labels`` reads
-    ``/ground_truth/labels`` of our own recordings, too.
+    has the very same stamp. ``labels`` reads ``/ground_truth/labels`` of our own recordings, too.
+
+    The bag is read once before: what has to be put right (``slam.logs.bag_survey``) is told in one
+    warning, counted in ``metadata.extra`` and refused by ``strict``. Scans whose headers differ are
+    each read by their own.
 
     An accumulated covariance of the odometry becomes that of each increment by the rule of
     ``slam.logs.bag_laser.increment_covariance``, unless the bag has it as it was
@@ -266,19 +274,26 @@ def read_bag(
     Raises ``LogFormatError`` that names the file for anything that is not such a bag.
     """
     path = Path(path)
-    with Bag(path) as bag:
+    repairs = Repairs(path, strict)
+    with Bag(path, repairs) as bag:
         topics = choose(bag, scan=scan, odometry=odometry, truth=truth, labels=labels)
-        laser, mounted = _probe(bag, topics)
+        known = survey(bag, topics, repairs)
+        laser, mounted = _probe(bag, topics, known)
         epoch_ns = _epoch_ns(bag, topics)
-        count = bag.topics[topics.scan][1]
         source = "rosbag1" if bag.is_ros1 else "rosbag2"
     extra: dict[str, Any] = {"file": path.name, "scan": topics.scan, "odometry": topics.odometry}
     if laser.turned:
         extra["turned"] = laser.turned
-    repairs = Repairs(path, strict)
+    if known.varies:
+        extra["varies"] = known.varies
+        _log.warning("%s: scans differ, each is read by its own header: %s", path, known.varies)
+    count = len(known.ranks)
     if topics.odometry is None:
         repairs.note(NO_ODOMETRY, "no message of nav_msgs/msg/Odometry", None, count)
-        repairs.warn()
+    if known.stands:
+        topics = replace(topics, odometry=None, increment=None)
+    repairs.warn()
+    extra |= {kind: n for kind, n in repairs.facts().items() if n}
     metadata = StreamMetadata(
         source=source,
         laser=laser.spec,
@@ -288,7 +303,9 @@ def read_bag(
         extra=extra | ({EPOCH: epoch_ns} if epoch_ns else {}),
     )
     return Stream(
-        metadata=metadata, frames=lambda: frames_of(path, topics, laser, epoch_ns), length=count
+        metadata=metadata,
+        frames=lambda: frames_of(path, topics, laser, epoch_ns, known),
+        length=count,
     )
 
 
@@ -303,7 +320,7 @@ def _epoch_ns(bag: Bag, topics: Topics) -> int:
     return 0
 
 
-def _probe(bag: Bag, topics: Topics) -> tuple[Laser, str]:  # noqa: C901 (one branch a kind of file)
+def _probe(bag: Bag, topics: Topics, surveyed: Survey) -> tuple[Laser, str]:  # noqa: C901 (one branch a kind of file)
     """The scanner, from the first messages of the bag; where its mounting comes from."""
     named = (topics.scan, topics.odometry, topics.turns, *topics.transforms)
     wanted = {name for name in named if name is not None}
@@ -314,7 +331,7 @@ def _probe(bag: Bag, topics: Topics) -> tuple[Laser, str]:  # noqa: C901 (one br
     robot = _BASE if topics.odometry is None else None
     mount, start_ns = None, None
     tried = (0, robot)  # so many transforms, to there
-    for topic, log_ns, message in bag.messages(wanted):
+    for topic, log_ns, message, _ in surveyed.in_order(bag.messages(wanted), topics.scan):
         start_ns = log_ns if start_ns is None else start_ns
         with about(bag.path, bag.at):
             if topic == topics.scan:
@@ -345,7 +362,8 @@ def _probe(bag: Bag, topics: Topics) -> tuple[Laser, str]:  # noqa: C901 (one br
         times = [stamp_of(scan, 0) for scan in scans]
         end = times[1] if len(times) > 1 else math.inf
         turns = [turn for turn in turns if times[0] <= stamp_of(turn, 0) < end]
-        return Laser(scans[0], turns, (np.zeros(3), False) if mount is None else mount), said
+        mount = (np.zeros(3), False) if mount is None else mount
+        return Laser(scans[0], turns, mount, saturates=surveyed.saturates), said
 
 
 def _frame_name(name: str) -> str:

@@ -117,6 +117,7 @@ def _possible(Q: Float) -> Float:
 
 FARTHEST_M = 1e4
 MAX_BEAMS = 100_000
+MOST_SHAPES = 1000  # headers of a scanner that are kept
 MOST_TRANSFORMS = 2000  # between frames; of a robot with arms, 200
 Matrix = list[list[float]]
 
@@ -127,64 +128,93 @@ class Laser:
     first    the first whole scan
     turns    its messages of single mirror turns, where there are any: they say when each beam was
     mount    ``T_robot_laser`` and whether the scanner hangs upside down
+    saturates  a range of range_max is none
 
     Beams that count clockwise are put in counter-clockwise order; ``turned`` says so. A range
     below zero (too close, REP 117) becomes NaN. Raises ``InvalidValueError`` for a geometry that
     cannot be.
     """
 
-    def __init__(self, first: Any, turns: Sequence[Any], mount: tuple[Float, bool]) -> None:
-        n = len(first.ranges)
+    def __init__(
+        self,
+        first: Any,
+        turns: Sequence[Any],
+        mount: tuple[Float, bool],
+        *,
+        saturates: bool = False,
+    ) -> None:
+        self._mount, self._saturates = mount, saturates
+        step = round_angle(first.angle_increment)
+        clockwise, hangs = "clockwise" if step < 0.0 else "", "upside down" if mount[1] else ""
+        self.turned = ", ".join(filter(None, (clockwise, hangs)))
+        times = _turn_times(first, turns) if turns else None
+        self._known = {shape_of(first): self._read(first, times)}
+        self.spec = self._known[shape_of(first)].spec
+
+    def _read(self, message: Any, times: Float | None = None) -> "_Geometry":
+        """What a scan's header says; ``times``: (n,) s of its beams, unless that says it, too."""
+        n = len(message.ranges)
         if not 0 < n <= MAX_BEAMS:
             raise InvalidValueError(f"a scan of {n} beams")
-        self._shape = _shape(first)
-        T_robot_laser, hanging = mount
-        start, step = round_angle(first.angle_min), round_angle(first.angle_increment)
-        times = _turn_times(first, turns) if turns else _line_times(first)
-        self._backwards = (step < 0.0) != hanging
-        clockwise, hangs = "clockwise" if step < 0.0 else "", "upside down" if hanging else ""
-        self.turned = ", ".join(filter(None, (clockwise, hangs)))
-        self._earliest_ns = round(float(times.min()) * NS_PER_S)
+        T_robot_laser, hanging = self._mount
+        start, step = round_angle(message.angle_min), round_angle(message.angle_increment)
+        times = _line_times(message) if times is None else times
+        backwards = (step < 0.0) != hanging
+        earliest_ns = round(float(times.min()) * NS_PER_S)
         if hanging:
             start, step = -start, -step
-        if self._backwards:
+        if backwards:
             start, step, times = start + (n - 1) * step, -step, times[::-1]
-        range_max = round_number(first.range_max)
-        self.spec = LaserSpec(
+        range_max = round_number(message.range_max)
+        spec = LaserSpec(
             n_beams=n,
             angle_min=start,
             angle_increment=step,
-            range_min=max(round_number(first.range_min), 0.0),
+            range_min=max(round_number(message.range_min), 0.0),
             range_max=min(range_max, FARTHEST_M),
             beam_time_offsets=times - times.min(),
             T_robot_laser=T_robot_laser,
         )
+        return _Geometry(spec, backwards, earliest_ns)
 
     def scan(self, message: Any, stamp_ns: int) -> Scan:
-        """``InvalidValueError`` when the scanner is another one than at first."""
-        if _shape(message) != self._shape:
-            raise InvalidValueError(
-                f"the scanner changes from {self._shape} to {_shape(message)} "
-                "(beams, angle_min, angle_increment, range_max)"
-            )
+        """Each by its own header; ``InvalidValueError`` for what no scanner can be."""
+        shape = shape_of(message)
+        if shape not in self._known:
+            if len(self._known) >= MOST_SHAPES:
+                self._known.clear()
+            self._known[shape] = self._read(message)
+        geometry = self._known[shape]
         ranges = message.ranges
         if (ranges < 0.0).any():
             ranges = np.where(ranges < 0.0, np.float32(np.nan), ranges)
+        if self._saturates:
+            ranges = np.where(ranges == message.range_max, np.float32(np.inf), ranges)
         intensities: NDArray[np.float32] | None = message.intensities
         if intensities is not None and len(intensities) != len(ranges):
             intensities = None
-        if self._backwards:
+        if geometry.backwards:
             ranges = ranges[::-1]
             intensities = None if intensities is None else intensities[::-1]
         return Scan(
-            stamp_ns=stamp_ns + self._earliest_ns,
+            stamp_ns=stamp_ns + geometry.earliest_ns,
             ranges=ranges,
-            spec=self.spec,
+            spec=geometry.spec,
             intensities=intensities,
         )
 
 
-def _shape(message: Any) -> tuple[int, float, float, float]:
+@dataclass(frozen=True, slots=True)
+class _Geometry:
+    """Of the scans of one header; ``backwards``: their beams are turned round."""
+
+    spec: LaserSpec
+    backwards: bool
+    earliest_ns: int
+
+
+def shape_of(message: Any) -> tuple[int, float, float, float]:
+    """What the header of a scan says of the scanner."""
     return (
         len(message.ranges),
         message.angle_min,

@@ -3,7 +3,7 @@
 
 from collections import Counter
 from collections.abc import Collection, Iterator
-from contextlib import contextmanager
+from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
@@ -15,7 +15,9 @@ from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 from slam import inputs
 from slam.bounded import check_file
 from slam.errors import LogFormatError, MissingPathError, MobiliaError
-from slam.logs import unpacking
+from slam.logs import bag_files, unpacking
+from slam.logs.bag_files import CURES, METADATA, CutShortError, suffix_of
+from slam.logs.repairs import LOST, NO_END, Repairs
 
 SCAN = "sensor_msgs/msg/LaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
@@ -34,7 +36,11 @@ _STORAGE = (".mcap", ".db3", ".bag")
 
 def is_bag(path: Path) -> bool:
     """Whether ``path`` looks like a rosbag2 folder, an .mcap, a .db3 or a ROS 1 .bag."""
-    return (path / "metadata.yaml").exists() or path.suffix in _STORAGE
+    return (
+        (path / METADATA).exists()
+        or suffix_of(path) in _STORAGE
+        or bag_files.is_folder_of_one(path)
+    )
 
 
 @contextmanager
@@ -50,70 +56,117 @@ def failing_as_ours(path: Path, where: str = "") -> Iterator[None]:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
     except Exception as error:  # parsers of foreign bytes fail in every way
         text = " ".join(str(error).split())[:200] or type(error).__name__
-        raise LogFormatError(path, f"{where}corrupt or truncated bag: {text}") from error
+        cure = f" ({CURES[suffix_of(path)]} may mend it)" if suffix_of(path) in CURES else ""
+        raise LogFormatError(path, f"{where}corrupt or truncated bag: {text}{cure}") from error
 
 
 class Bag:
     """An open bag; a context manager. ``topics``: name -> (message type, count).
 
-    Messages are decoded by the standard definitions of their types, whatever the bag itself says of
-    them: those read here are the same in every ROS 2, and compiling decoders for each bag again
-    would take longer than reading a short one.
+    Messages come in the order in which they were recorded. They are decoded by the standard
+    definitions of their types, whatever the bag itself says of them: those read here are the same
+    in every ROS 2, and compiling decoders for each bag again would take longer than reading a short
+    one. So does metadata.yaml say nothing of how they are read, neither its types nor its QoS.
+
+    repairs  takes what is read of a recording without an end; without it, such a bag is refused
     """
 
-    def __init__(self, path: Path) -> None:
-        self.path = path
-        self.is_ros1 = path.suffix == ".bag" and not path.is_dir()
+    def __init__(self, path: Path, repairs: Repairs | None = None) -> None:
+        self.path, self._repairs = path, repairs
+        self.is_ros1 = suffix_of(path) == ".bag" and not path.is_dir()
         if not path.exists():
             raise MissingPathError(path, "no such file")
         for file in path.iterdir() if path.is_dir() else [path]:
             if file.exists() and not file.is_dir():
                 check_file(file)
                 inputs.note(file)
-        with failing_as_ours(path):
-            self._reader: Any = ReaderOfRos1(path) if self.is_ros1 else Reader(_storage(path))
         self.at = ""  # which message was read last, in the words of an error
+        self._cut: set[Path] = set()
         self._decode = ROS1.deserialize_ros1 if self.is_ros1 else ROS2.deserialize_cdr
 
     def __enter__(self) -> "Bag":
-        with failing_as_ours(self.path):
-            self._reader.open()
-            self.topics: dict[str, tuple[str, int]] = {
-                name: (info.msgtype or "", info.msgcount)
-                for name, info in self._reader.topics.items()
-            }
+        with failing_as_ours(self.path), ExitStack() as stack:
+            files, counts, missing = bag_files.files_of(self.path)
+            if not files:
+                raise LogFormatError(self.path, "a bag without a recording (.mcap, .db3) in it")
+            without = self.path.is_dir() and not (self.path / METADATA).exists()
+            if without and files[0].suffix == ".db3":  # an .mcap has an end of its own
+                self._note(NO_END, f"no {METADATA}: its recorder was killed")
+            self._files = [self._opened(file, stack) for file in files]
+            found: Counter[str] = Counter()
+            kinds: dict[str, str] = {}
+            for file in self._files:
+                for name, (kind, count) in self._index(file).items():
+                    found[name] += count
+                    kinds[name] = kind
+            self.topics = {name: (kinds[name], found[name]) for name in kinds}
+            lost = sum(max(count - found[name], 0) for name, count in counts.items())
+            if lost or missing:
+                few = f" {', '.join(missing[:3])} is not there," if missing else ""
+                why = f"{METADATA} counts messages that are in no file:{few} {lost} messages"
+                self._note(LOST, why, max(lost, 1))
+            self._stack = stack.pop_all()
         return self
 
     def __exit__(self, *_: object) -> None:
-        with failing_as_ours(self.path):
-            self._reader.close()
+        self._stack.close()
+
+    def _note(self, kind: str, why: str, count: int = 1) -> None:
+        if self._repairs is None:
+            raise LogFormatError(self.path, why)
+        self._repairs.note(kind, why, None, count)
+
+    def _opened(self, file: Path, stack: ExitStack) -> Path:
+        """The file, or a copy of it that can be read."""
+        copy, wrong = bag_files.settled(file, stack)
+        if wrong:
+            self._note(LOST, wrong)
+        return copy
+
+    def _index(self, file: Path) -> dict[str, tuple[str, int]]:
+        """The topics of a file by its index, or of one without an end by what is in it."""
+        try:
+            library: Any = ReaderOfRos1(file) if self.is_ros1 else Reader(file)
+            with library as reader:
+                return {
+                    name: (info.msgtype or "", info.msgcount)
+                    for name, info in reader.topics.items()
+                }
+        except Exception as error:  # parsers of foreign bytes fail in every way
+            if self._repairs is None or not bag_files.can_be_cut(file):
+                raise
+            topics: dict[str, tuple[str, int]] = {}
+            with suppress(CutShortError):
+                for name, kind, _, _ in bag_files.records(file):
+                    topics[name] = kind, topics.get(name, ("", 0))[1] + 1
+            if not topics:
+                raise
+            why = " ".join(str(error).split())[:100]
+            why += f": its recorder was killed, and {CURES[suffix_of(file)]} may mend it"
+            self._note(NO_END, why)
+            self._cut.add(file)
+            return topics
 
     def raw(self, topics: Collection[str] | None = None) -> Iterator[tuple[str, str, int, bytes]]:
-        """(topic, type, log time ns, bytes) in the order of the log time; None: every topic."""
-        for connection, log_ns, data in self._messages(topics):
-            yield connection.topic, connection.msgtype, log_ns, data
+        """(topic, type, log time ns, bytes) as they were recorded; None: every topic."""
+        for file in self._files:
+            with failing_as_ours(self.path):
+                try:
+                    for topic, kind, log_ns, data in bag_files.records(file, topics):
+                        yield topic, kind, log_ns, unpacking.of_message(data)
+                except CutShortError:
+                    if file not in self._cut:
+                        raise
 
     def messages(self, topics: Collection[str]) -> Iterator[tuple[str, int, Any]]:
         """(topic, log time ns, message) of these topics."""
         count: Counter[str] = Counter()
-        for connection, log_ns, data in self._messages(topics):
-            count[connection.topic] += 1
-            self.at = f"topic {connection.topic}, message {count[connection.topic]}"
+        for topic, kind, log_ns, data in self.raw(topics):
+            count[topic] += 1
+            self.at = f"topic {topic}, message {count[topic]}"
             with failing_as_ours(self.path, f"{self.at}: "):
-                decoded = self._decode(data, connection.msgtype)
-            yield connection.topic, log_ns, decoded
-
-    def _messages(self, topics: Collection[str] | None) -> Iterator[tuple[Any, int, bytes]]:
-        wanted = [c for c in self._reader.connections if topics is None or c.topic in topics]
-        if wanted:
-            with failing_as_ours(self.path):
-                yield from self._reader.messages(connections=wanted)
-
-
-def _storage(path: Path) -> Path:
-    """The only .mcap of a folder instead of the folder: it says all, and sooner than the YAML."""
-    files = list(path.glob("*.mcap")) if path.is_dir() else []
-    return files[0] if len(files) == 1 else path
+                decoded = self._decode(data, kind)
+            yield topic, log_ns, decoded
 
 
 @dataclass(frozen=True, kw_only=True)

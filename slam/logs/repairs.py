@@ -22,6 +22,13 @@ STRAY_STAMPS = "stamps_stray"
 STAMPS_WRAPPED = "stamps_wrapped"
 SHORT_ODOM = "odom_lines_without_speeds"
 NO_ODOMETRY = "scans_with_assumed_odometry"
+STANDS_STILL = "odometry_stands_still"
+NO_END = "files_without_end"
+LOST = "messages_missing"
+SHORT_SCANS = "scans_without_beams_or_short"
+LEFT_OUT = "scans_left_out"
+AT_RANGE_MAX = "returns_at_range_max"
+USUAL = (TORN_LINE, STAMPS_SORTED, STAMPS_SPREAD, CLOCK_STEPS, STRAY_STAMPS)
 WORDS = {
     TORN_LINE: "{} torn end (a last line or object without its end) left out",
     STAMPS_SORTED: "{} stamps that step back by less than 1 s sorted by time",
@@ -30,6 +37,12 @@ WORDS = {
     STRAY_STAMPS: "{} stamps far from their neighbours' replaced",
     STAMPS_WRAPPED: "{} stamps of 4.29497e+09 s (below 0, in 32 bits) put back where they were",
     SHORT_ODOM: "{} ODOM lines without speeds and host read as x y theta t",
+    STANDS_STILL: "odometry that stands still while scans move taken as none ({} messages)",
+    NO_END: "{} files without an end, of a recorder that was killed, read up to the cut",
+    LOST: "{} messages missing that the recording says it has",
+    SHORT_SCANS: "{} scans without beams, or of less than half of them, left out",
+    LEFT_OUT: "{} scans outside the time of the odometry, or with the time of another, left out",
+    AT_RANGE_MAX: "{} returns in a mass exactly at range_max read as none",
     NO_ODOMETRY: "no odometry: {} scans with that of a constant velocity",
 }
 
@@ -39,23 +52,24 @@ class Repairs:
     """Of one log, while it is read.
 
     strict  whether a repair is refused: ``note`` raises ``LogFormatError`` then
+    where   which part of the log is at hand, for what is refused
     counts  how many of each kind were made
     """
 
     path: Path
     strict: bool = False
+    where: str = ""
     counts: Counter[str] = field(default_factory=Counter)
 
     def note(self, kind: str, why: str, line: int | None = None, count: int = 1) -> None:
         """One repair, or ``count`` of them; ``why`` is what a strict reader says."""
         if self.strict:
-            raise LogFormatError(self.path, f"{why} (refused by --strict)", line)
+            raise LogFormatError(self.path, f"{self.where}{why} (refused by --strict)", line)
         self.counts[kind] += count
 
     def facts(self) -> dict[str, int]:
         """The counts, of all kinds that most text logs can have, for ``StreamMetadata.extra``."""
-        rare = (SHORT_ODOM, NO_ODOMETRY, STAMPS_WRAPPED)
-        return {kind: self.counts[kind] for kind in WORDS if kind not in rare or self.counts[kind]}
+        return {kind: self.counts[kind] for kind in WORDS if kind in USUAL or self.counts[kind]}
 
     def warn(self) -> None:
         """Say all of them in one line, if there are any."""
@@ -130,12 +144,19 @@ def _signed(stamps_ns: list[int], a: int, b: int, usual: int, *, known: bool) ->
 
 
 def continued(
-    stamps_ns: Sequence[int], lines: Sequence[int], repairs: Repairs, digits: int = FINE_DIGITS
+    stamps_ns: Sequence[int],
+    lines: Sequence[int | None],
+    repairs: Repairs,
+    digits: int = FINE_DIGITS,
+    elapsed_ns: Sequence[int] | None = None,
 ) -> list[int]:
     """The stamps, in the order of the log, without steps back of 1 s or more.
 
     A clock that was set back goes on from where it was. Up to three stamps in a row that lie before
     their neighbours, or more than 10 s ahead, are stray ones: they get the stamp before them.
+
+    elapsed_ns  since the stamp before, by another clock; below 0 where that was set back, too
+
     Raises ``LogFormatError`` where that adds up to more than 64 bits of nanoseconds.
     """
     out: list[int] = []
@@ -155,8 +176,9 @@ def continued(
                 now = latest
             else:
                 repairs.note(CLOCK_STEPS, why, lines[k])
-                offset += latest + usual - now
-                now = latest + usual
+                step = usual if elapsed_ns is None or elapsed_ns[k] < 0 else elapsed_ns[k]
+                offset += latest + step - now
+                now = latest + step
         out.append(now)
         latest = max(latest, now) if k else now
     for now, line in zip(out, lines, strict=True):

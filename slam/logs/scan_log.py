@@ -3,7 +3,7 @@
 
 import math
 from collections import Counter
-from dataclasses import dataclass, field
+from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
@@ -12,7 +12,7 @@ import numpy as np
 from slam.constant_velocity import standing
 from slam.errors import LogFormatError
 from slam.frames import Float, Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata
-from slam.logs.repairs import NO_ODOMETRY, Ordered, Repairs, put_in_order
+from slam.logs.repairs import LEFT_OUT, NO_ODOMETRY, STANDS_STILL, Ordered, Repairs, put_in_order
 from slam.logs.scan_poses import (
     LaserMessage,
     PoseMessage,
@@ -22,6 +22,7 @@ from slam.logs.scan_poses import (
     rough_steps,
     scan_poses,
 )
+from slam.logs.standing import Standing
 from slam.logs.text import about
 
 DEFAULT_RANGE_MAX_M = 80.0  # CARMEN's own guess for FLASER
@@ -60,6 +61,10 @@ def stream_of(log: ScanLog, repairs: Repairs, source: str) -> Stream:
     wheels = log.wheels or any(scan.robot_pose is not None for scan in scans) or bool(odom)
     if wheels:
         poses = scan_poses(log.path, scans, odom, truth, log.mount)
+        if _stands_still(scans, poses):
+            wheels, poses = False, replace(poses, wheels=False)
+            why = "the odometry stands still while scans move"
+            repairs.note(STANDS_STILL, why, None, len(scans))
     else:
         poses = at_rest(scans, log.mount)
         repairs.note(NO_ODOMETRY, "the log has no odometry", None, len(scans))
@@ -77,6 +82,9 @@ def stream_of(log: ScanLog, repairs: Repairs, source: str) -> Stream:
     frames = _frames(log.path, scans, ordered, ranges, spec, poses)
     if not frames:
         raise LogFormatError(log.path, "no scan lies within the time of the ODOM lines")
+    if len(frames) < len(scans):
+        left = len(scans) - len(frames)
+        repairs.note(LEFT_OUT, f"{left} scans outside the time of the ODOM lines", None, left)
     repairs.warn()
     extra: dict[str, Any] = {
         "file": log.path.name,
@@ -99,6 +107,16 @@ def stream_of(log: ScanLog, repairs: Repairs, source: str) -> Stream:
         extra=extra,
     )
     return Stream(metadata=metadata, frames=lambda: frames, length=len(frames))
+
+
+def _stands_still(scans: list[LaserMessage], poses: ScanPoses) -> bool:
+    standing = Standing()
+    for pose in poses.odometry:
+        if pose is not None:
+            standing.pose(pose.tolist())
+    for scan in scans if standing.still else ():
+        standing.scan(np.array(scan.ranges))
+    return standing.stands
 
 
 def _check_one_scanner(path: Path, scans: list[LaserMessage]) -> None:

@@ -13,7 +13,6 @@ from typing import Any, BinaryIO, cast
 
 from lz4.frame import LZ4FrameDecompressor  # type: ignore[import-untyped]  # rosbags brings both
 from rosbags.rosbag1 import reader as ros1
-from rosbags.rosbag2 import reader as ros2
 from rosbags.rosbag2 import storage_mcap
 
 from slam.errors import LogFormatError
@@ -30,6 +29,7 @@ MAX_RAWLOG_BYTES = 1 << 29  # of a rawlog, unpacked: laser and odometry of hours
 MAX_MAT_BYTES = 1 << 28  # of a MATLAB file, unpacked; those of Victoria Park have 5 MB
 XZ_MEMORY_BYTES = 1 << 27  # to unpack an .xz; ``xz -9`` needs 65 MB
 _STEP = 1 << 20
+_ZSTD = b"\x28\xb5\x2f\xfd"
 
 
 def bounded(decompressor: Any, data: bytes, most: int) -> bytes:
@@ -40,6 +40,32 @@ def bounded(decompressor: Any, data: bytes, most: int) -> bytes:
     if not decompressor.eof:
         raise ValueError("a chunk ends before its end")
     return out
+
+
+def beginning(data: bytes, compression: str) -> bytes:
+    """What the first bytes of a chunk that was cut unpack to, as far as they go."""
+    if compression in ("", "none"):
+        return data
+    make = {"lz4": LZ4FrameDecompressor, "zstd": zstd.ZstdDecompressor, "bz2": bz2.BZ2Decompressor}
+    try:
+        return bytes(make[compression]().decompress(data, max_length=MAX_CHUNK_BYTES))
+    except (EOFError, OSError, RuntimeError, ValueError, zstd.ZstdError):
+        return b""
+
+
+def unpacked(file: BinaryIO) -> BinaryIO:
+    """A bag's file that was packed whole, as it is unpacked; bounded."""
+    return cast(BinaryIO, _File(zstd.open(file, "rb")))
+
+
+def of_message(data: bytes) -> bytes:
+    """A message, also of a bag whose messages were packed one by one; bounded.
+
+    What ROS 2 writes never begins as Zstandard does.
+    """
+    if not data.startswith(_ZSTD):
+        return data
+    return bounded(zstd.ZstdDecompressor(), data, MAX_CHUNK_BYTES)
 
 
 def _of_size(make: Any) -> Any:
@@ -72,27 +98,12 @@ class _File(io.RawIOBase):
         return out
 
 
-class _Zstd:
-    """What the library calls for bags that were packed file by file or message by message."""
-
-    @staticmethod
-    def open(file: Any, _mode: str) -> _File:
-        """As ``zstd.open`` for reading, bounded."""
-        return _File(zstd.open(file, "rb"))
-
-    @staticmethod
-    def decompress(data: bytes) -> bytes:
-        """As ``zstd.decompress``, bounded."""
-        return bounded(zstd.ZstdDecompressor(), data, MAX_CHUNK_BYTES)
-
-
 def bound_rosbags() -> None:
     """Put bounded decompressors in place of those of the rosbags library, which has no limits."""
     storage_mcap.DECOMPRESSORS["lz4"] = _of_size(LZ4FrameDecompressor)
     storage_mcap.DECOMPRESSORS["zstd"] = _of_size(zstd.ZstdDecompressor)
     ros1.decompressors["bz2"] = lambda data: bounded(bz2.BZ2Decompressor(), data, MAX_CHUNK_BYTES)
     ros1.decompressors["lz4"] = lambda data: bounded(LZ4FrameDecompressor(), data, MAX_CHUNK_BYTES)
-    vars(ros2)["zstd"] = _Zstd
 
 
 def open_xz(path: Path) -> BinaryIO:
