@@ -180,6 +180,21 @@ def test_a_higher_existence_probability_never_gives_a_lower_activity(
         assert (y >= x - 1e-6).all()
 
 
+def test_what_is_static_grows_and_what_moved_fades() -> None:
+    """Characteristics 2 and 3: confidence rises look by look; gone, it falls look by look."""
+    network = started(plain(), np.zeros((COUNT, COUNT)))
+    thing = np.zeros((COUNT, COUNT))
+    thing[4:7, 0:3] = 0.9
+    rising = [inspired(network, thing, 0.1)[5, 1] for _ in range(20)]
+    assert (np.diff(rising) > 0.0).all()
+    moved = np.roll(thing, 4, axis=1)
+    steps = [inspired(network, moved, 0.1) for _ in range(60)]
+    left, now = [x[5, 1] for x in steps], [x[5, 5] for x in steps]
+    assert (np.diff(left)[: np.flatnonzero(np.array(left) > 0.0)[-1]] < 0.0).all()
+    assert left[-1] == 0.0
+    assert (np.diff(now) > 0.0).all()
+
+
 def test_confidence_rises_when_a_loop_closes() -> None:
     """Characteristic 4: seen briefly, out of sight for long, seen again: more sure than ever."""
     config = ShuntingConfig(cell_m=CELL)
