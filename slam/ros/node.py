@@ -19,7 +19,8 @@ from slam.estimate import Estimate, Raster
 from slam.frames import NS_PER_S, Float, Odometry
 from slam.frontend.odometry_prior import turned
 from slam.logs import unpacking
-from slam.logs.bag import MOST_POSE_M, PLANAR, planar, stamp_of
+from slam.logs.bag import MOST_POSE_M, PLANAR, planar
+from slam.logs.bag_survey import stamp_of
 from slam.logs.bag_laser import PoseTrack, Stamped
 from slam.ros.link import Link, Topic
 from slam.ros.messages import MAP, ODOM, MapMessage, StartMessage, TransformMessage
