@@ -181,15 +181,15 @@ def _as_odometry_stepped(
 
 
 def _whole(shapes: Sequence[tuple[int, float, float, float]]) -> list[int]:
-    """The numbers of those that are whole scans of a possible scanner; all where most are not."""
+    """The numbers of those that have about as many beams, or as wide a view, as is usual; all
+    where most have none."""
     table = np.array(shapes, np.float64).reshape(-1, 4)
     beams, views = table[:, 0], (table[:, 0] - 1.0) * np.abs(table[:, 2])
-    good = (beams > 0) & np.isfinite(table[:, :3]).all(axis=1)
-    good &= (table[:, 2] != 0.0) & (table[:, 3] > 0.0)
-    if good.sum() <= 0.5 * len(shapes):
+    usual = (beams > 0) & np.isfinite(views)
+    if usual.sum() <= 0.5 * len(shapes):
         return list(range(len(shapes)))
-    good &= (beams >= SHORT * np.median(beams[good])) | (views >= SHORT * np.median(views[good]))
-    return [int(k) for k in np.flatnonzero(good)]
+    enough = (beams >= SHORT * np.median(beams[usual])) | (views >= SHORT * np.median(views[usual]))
+    return [int(k) for k in np.flatnonzero(enough & (beams > 0))]
 
 
 def _spread(shapes: Sequence[tuple[int, float, float, float]]) -> str:

@@ -9,7 +9,6 @@ from slam.errors import LogFormatError
 from slam.estimate import Estimate
 from slam.frames import NS_PER_S, Frame
 from slam.logs.bag_topics import INCREMENT, TRANSFORMS, Bag
-from slam.logs.repairs import Repairs
 from slam.logs.text import about
 from slam.path import OnPath, PosePath
 from slam.ros.messages import MAP, ODOM
@@ -31,7 +30,7 @@ def read_statements(
     """
     found: dict[int, StampedPose] = {}
     wrong: list[LogFormatError] = []
-    with Bag(path, Repairs(path)) as bag:
+    with Bag(path) as bag:
         kinds = (INCREMENT,) if pose is not None else TRANSFORMS
         topics = [
             name for name, (kind, _) in bag.topics.items()
