@@ -75,6 +75,10 @@ def npz(target: Path, stream: Stream, _: str) -> list[Path]:
     if not frames or frames[0].scan is None:
         raise InvalidValueError("npz holds scans: this log has none")
     spec = frames[0].scan.spec
+    if any(f.scan is not None and f.scan.spec != spec for f in frames):
+        raise InvalidValueError(
+            "npz holds scans of one geometry, those of this log differ: give --to carmen"
+        )
     arrays = {
         "stamps_ns": np.array([f.stamp_ns for f in frames]),
         "epoch_ns": np.array(stream.metadata.extra.get(EPOCH, 0)),

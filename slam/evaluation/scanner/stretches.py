@@ -4,6 +4,7 @@
 from collections.abc import Iterator
 from dataclasses import dataclass
 from itertools import pairwise
+from typing import Any
 
 import numpy as np
 from numpy.typing import NDArray
@@ -68,11 +69,16 @@ def stretches_of(stream: Stream) -> Stretches:
 
 def _read(stream: Stream) -> tuple[LaserSpec, Float, Float]:
     """The scanner, (k, n) ranges m and (k, 3) odometry."""
-    rows, poses = [], []
+    rows, poses = list[Any](), list[Float]()
     spec = stream.metadata.laser
     for frame in stream:
         if frame.scan is None:
             continue
+        if rows and frame.scan.spec.n_beams != len(rows[0]):
+            raise InvalidValueError(
+                f"the log must have scans of one number of beams, got {len(rows[0])} and "
+                f"{frame.scan.spec.n_beams}"
+            )
         spec = frame.scan.spec
         rows.append(np.where(frame.scan.valid, frame.scan.ranges, np.nan))
         poses.append(frame.odometry.T_odom_robot)

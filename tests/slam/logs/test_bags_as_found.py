@@ -11,7 +11,8 @@ import pytest
 
 import tests.slam.logs.foreign_bags as bags
 from slam import create, se2
-from slam.errors import LogFormatError
+from slam.errors import InvalidValueError, LogFormatError
+from slam.evaluation.scanner.card import measure
 from slam.logs import open_log, read_bag
 from slam.replay import Replay
 from tests.world2d import Drive, World2D, arena, frames, laser
@@ -90,6 +91,12 @@ def test_each_scan_is_read_by_its_own_header(tmp_path, driven, change, caplog):
     assert error < 0.02
     assert count == SCANS
     assert [r for r in caplog.records if "each is read by its own header" in r.getMessage()]
+
+
+def test_what_needs_one_geometry_says_so(tmp_path, driven):
+    stream = read_bag(bags.write_ros2(tmp_path / "a", recorded(driven, fewer_beams)))
+    with pytest.raises(InvalidValueError, match="one number of beams, got 181 and 180"):
+        measure(stream)
 
 
 @pytest.mark.parametrize("torn", [0, 1, 60])
