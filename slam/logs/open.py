@@ -11,6 +11,7 @@ from slam.logs.bag import read_bag
 from slam.logs.bag_topics import is_bag
 from slam.logs.carmen import is_carmen, read_carmen
 from slam.logs.centimetre import is_centimetre, read_centimetre
+from slam.logs.foreign import what_instead
 from slam.logs.rawlog import is_rawlog, read_rawlog
 from slam.logs.rover import read_rover
 from slam.logs.victoria_park import is_victoria_park, read_victoria_park
@@ -77,6 +78,8 @@ def open_log(
     Raises ``LogFormatError`` when the file is missing, damaged or of no known format.
     """
     path = Path(path)
+    if not is_bag(path) and (what := what_instead(path)):  # a bag says it itself
+        raise LogFormatError(path, what)
     if text_format is not None:
         return read_rover(path, text_format, strict=strict)
     if path.is_dir() and not (is_bag(path) or is_victoria_park(path)):

@@ -4,7 +4,9 @@
 docs/logs.md has its keys; ``read_format`` refuses others. Columns count from 1.
 """
 
+import csv
 import math
+from collections import Counter
 from collections.abc import Iterator
 from pathlib import Path
 from typing import Annotated, Any, Literal
@@ -121,14 +123,18 @@ def read_format(path: str | Path) -> RoverFormat:
 
 
 SCAN = "line"
+NAMES = "lines of column names"
+NOTHING = ("", "na", "n/a", "nan", "none", "null", "-inf")  # cells that say no range
 
 
 def read_rover(path: str | Path, text_format: str | Path, *, strict: bool = False) -> Stream:
     """A text log (plain, .gz or .xz) with one scan a line, as ``text_format`` describes it.
 
     ``text_format`` is a TOML file (docs/logs.md). Empty lines and those that begin
-    with ``#`` are left out. Ranges of 0 are error codes, those at the maximum no return. Without
-    odometry the frames have that of a robot at rest, and ``metadata.odometry`` says so.
+    with ``#`` are left out, and so are first lines of names: those without a number where the time
+    and the odometry are. Ranges of 0, nan and empty cells are error codes; inf and those at the
+    maximum are no return. Without odometry the frames have that of a robot at rest, and
+    ``metadata.odometry`` says so.
 
     Repairs and ``strict`` are those of ``read_carmen``. Raises ``LogFormatError`` with file, line,
     the value and what was expected.
@@ -138,8 +144,12 @@ def read_rover(path: str | Path, text_format: str | Path, *, strict: bool = Fals
     repairs = Repairs(path, strict)
     odometry = _Odometry(how.odometry)
     mount = (how.laser or Laser()).mount
-    scans = []
+    scans: list[LaserMessage] = []
+    named = 0
     for number, words in _rows(path, how.separator, repairs):
+        if not scans and _is_names(words, how):
+            named += 1
+            continue
         with about(path, line=number):
             scans.append(_scan(number, words, how, odometry.pose(words), mount))
     if not scans:
@@ -152,14 +162,37 @@ def read_rover(path: str | Path, text_format: str | Path, *, strict: bool = Fals
         mounted=f"[laser] of {Path(text_format).name}" if how.laser else "",
         wheels=how.odometry is not None,
         digits=FINE_DIGITS,
+        ignored=Counter({NAMES: named} if named else {}),
     )
     return stream_of(log, repairs, "rover")
+
+
+def _is_names(words: list[str], how: RoverFormat) -> bool:
+    """Whether it is a line of column names, as tables have: nothing but its ranges is a number."""
+    columns = [how.time.column]
+    if isinstance(how.odometry, Poses):
+        columns += [how.odometry.x, how.odometry.y, how.odometry.theta]
+    elif how.odometry is not None:
+        columns += [how.odometry.left, how.odometry.right]
+    found = [words[column - 1].strip() for column in columns if column <= len(words)]
+    return len(found) == len(columns) and all(word and not _is_number(word) for word in found)
+
+
+def _is_number(word: str) -> bool:
+    try:
+        float(word)
+    except ValueError:
+        return False
+    return True
 
 
 def _rows(path: Path, separator: str, repairs: Repairs) -> Iterator[tuple[int, list[str]]]:
     for number, line in numbered_lines(path, repairs):
         if line.strip() and not line.lstrip().startswith("#"):
-            yield number, line.split(None if separator.isspace() else separator)
+            if separator.isspace():
+                yield number, line.split()
+            else:
+                yield number, next(csv.reader([line], delimiter=separator))
 
 
 class _Odometry:
@@ -251,13 +284,23 @@ def _ranges(words: list[str], how: Ranges) -> list[float]:
         wanted = f"{how.beams} ranges from" if how.beams else "ranges from"
         raise ValueError(f"{len(words)} columns; expected {wanted} column {how.first}")
     columns = range(how.first, last + 1)
-    values = [_number(words, column, "range") * SI[how.unit] for column in columns]
+    values = [_range(words, column, how) for column in columns]
     for column, value in zip(columns, values, strict=True):
         if not 0.0 <= value <= MAX_RANGE_M:
             raise ValueError(
                 f"range in column {column} must be 0 to {MAX_RANGE_M:g} m, got {value:g} m"
             )
     return values
+
+
+def _range(words: list[str], column: int, how: Ranges) -> float:
+    """m; 0 for a cell that says none, the maximum for inf: no return."""
+    word = words[column - 1].strip().lower()
+    if word in NOTHING:
+        return 0.0
+    if word.lstrip("+") in ("inf", "infinity"):
+        return min(how.range_max * SI[how.unit], MAX_RANGE_M)
+    return _number(words, column, "range") * SI[how.unit]
 
 
 def _number(words: list[str], column: int, field: str, limit: float = LARGEST) -> float:

@@ -150,7 +150,7 @@ def _text(path: Path, number: int, raw: bytes) -> str:
             raise LogFormatError(path, f"line longer than {MAX_LINE_BYTES} bytes: no log", number)
         raise LogFormatError(path, _NO_END, number)
     try:
-        line = raw.decode("utf-8").rstrip("\r\n")
+        line = raw.decode("utf-8-sig" if number == 1 else "utf-8").rstrip("\r\n")
     except UnicodeDecodeError as error:
         raise LogFormatError(path, "not a text file", number) from error
     if _CONTROL.search(line):

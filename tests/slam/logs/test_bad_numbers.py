@@ -138,6 +138,8 @@ PLACES = [  # format, line from 0, word from 0, what the error calls it
 @pytest.mark.parametrize("bad", ["nan", "-inf", "1e300", "1e99999", "12..5"])
 @pytest.mark.parametrize(("name", "line", "word", "field"), PLACES)
 def test_a_number_that_breaks_a_bound_is_named(tmp_path, name, line, word, field, bad):
+    if (name, word) == ("ticks", 5) and bad in ("nan", "-inf"):
+        pytest.skip("says that there is no range")
     rows = ROWS[name]()
     mark = "," if name == "poses" else " "
     words = rows[line].rstrip("\n").split(mark)

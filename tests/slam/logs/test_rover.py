@@ -156,3 +156,36 @@ def test_the_description_in_the_docs_is_one(tmp_path):
     (tmp_path / "rover.toml").write_text(block)
     made = read_format(tmp_path / "rover.toml")
     assert (made.scan.first, made.scan.beams, made.odometry.counter) == (25, 682, 65536)
+
+
+HEADS = ["time,x,y,theta,r0,r1,r2\n", '"t [s]","x","y","yaw",0,1,2\n', "%a,b,c,d,e\ns,m,m,deg,m\n"]
+
+
+@pytest.mark.parametrize("head", ["", *HEADS, "\ufeff", "\ufeff" + HEADS[0]])
+@pytest.mark.parametrize("end", ["\n", "\r\n"])
+def test_a_table_may_name_its_columns(tmp_path, head, end):
+    rows = head + "".join(f"{k},{k},0,0, 1.0,2.0,3.0\n" for k in range(3))
+    path, how = write(tmp_path, POSES, "")
+    path.write_bytes(rows.replace("\n", end).encode())
+    stream = read_rover(path, how, strict=True)
+    assert [frame.odometry.T_odom_robot[0] for frame in stream] == [0.0, 1.0, 2.0]
+    assert sum(stream.metadata.extra["ignored"].values()) == head.strip("\ufeff").count("\n")
+
+
+def test_cells_without_a_range_are_no_returns(tmp_path):
+    cells = ["inf", "+Infinity", "nan", "", "N/A", "null", "-inf", "4.0"]
+    path, how = write(tmp_path, POSES, f"0,0,0,0,{','.join(cells)}\n1,0,0,0{',1' * len(cells)}\n")
+    found = next(iter(read_rover(path, how))).scan.ranges[::-1]  # counted clockwise
+    assert np.isinf(found[:2]).all()
+    assert np.isnan(found[2:7]).all()
+    assert found[7] == 4.0
+
+
+@pytest.mark.parametrize("cell", ["", "nan", "inf", "x"])
+@pytest.mark.parametrize("column", [0, 1, 3])
+def test_times_and_poses_stay_strict(tmp_path, cell, column):
+    cells = ["1", "0", "0", "0", "1", "2", "3"]
+    cells[column] = cell
+    path, how = write(tmp_path, POSES, f"0,0,0,0,1,2,3\n{','.join(cells)}\n")
+    with pytest.raises(LogFormatError, match=r"a\.txt:2: .*expected a number"):
+        list(read_rover(path, how))
