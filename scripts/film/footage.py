@@ -6,6 +6,8 @@ from dataclasses import dataclass, field, replace
 from pathlib import Path
 from typing import Any
 
+import numpy as np
+
 from scripts.comparison.again import Again, again
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.show import Show
@@ -28,7 +30,7 @@ from slam.errors import (
 from slam.frames import NS_PER_S, Float, Stream
 from slam.logs import open_log
 from slam.logs.bag import read_bag
-from slam.logs.bag_topics import is_bag
+from slam.logs.bag_topics import Asked, is_bag
 from slam.logs.mounting import MountingTest, remounted
 from slam.oracle import Oracle
 from slam.replay import Replay, systems_named
@@ -48,6 +50,7 @@ class Footage:
     scans    of a log, how many
     tested   of a log, what says how its scanner is mounted
     empty    of a log, share of its scans with next to no returns
+    usual_m  of a log, the median range
     """
 
     stream: Stream
@@ -58,6 +61,7 @@ class Footage:
     slam: str = ""
     scans: int = 0
     empty: float = 0.0
+    usual_m: float = 0.0
     tested: MountingTest | None = None
     made_with: Mapping[str, Any] = field(default_factory=dict)
 
@@ -179,23 +183,32 @@ def of_log(
     text_format: Path | None = None,
     mount: Float | None = None,
     flip: bool = False,
+    asked: Asked = Asked(),  # noqa: B008 (frozen)
 ) -> Footage:
     """A log: its scans are all that is known of the world. Options as of ``open_log``.
 
     mount  (3,) T_robot_laser in place of the log's; ``flip``: its beams count the other way round
+    asked  topics of a bag; ``InvalidValueError`` for a log that is none
     """
     check_bag(path)
     if text_format is None and is_bag(path):
-        stream = read_bag(path, labels=True, strict=strict)
+        stream = read_bag(path, labels=True, strict=strict, **vars(asked))
+    elif asked != Asked():
+        raise InvalidValueError(f"--scan and --odometry name topics, and {path} is no bag")
     else:
         stream = open_log(path, strict=strict, text_format=text_format)
     if mount is not None or flip:
         by = " and ".join(w for w, on in (("--laser", mount is not None), ("--flip", flip)) if on)
         stream = remounted(stream, mount, flip=flip, by=by)
     labelled, stamps_ns, empty, tested = False, list[int](), 0, MountingTest()
+    usual_m: list[float] = []
     for frame in stream:
         tested.note(frame)
-        empty += frame.scan is not None and float(frame.scan.valid.mean()) < FEW_RETURNS
+        if frame.scan is not None:
+            empty += float(frame.scan.valid.mean()) < FEW_RETURNS
+            ranges = frame.scan.ranges[np.isfinite(frame.scan.ranges)]
+            if len(ranges):
+                usual_m.append(float(np.median(ranges)))
         stamps_ns.append(frame.stamp_ns)
         labelled = labelled or frame.labels is not None
     if not stamps_ns:
@@ -208,6 +221,7 @@ def of_log(
         truth_name=stream.metadata.truth or "truth",
         scans=len(stamps_ns),
         empty=empty / len(stamps_ns),
+        usual_m=float(np.median(usual_m)) if usual_m else 0.0,
         tested=tested,
     )
 

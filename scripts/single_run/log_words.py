@@ -13,10 +13,12 @@ from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import Float, StreamMetadata
 from slam.logs.mounting import Mounting
 from slam.logs.repairs import STANDS_STILL, WORDS
+from slam.logs.rover import NAMES
 from slam.replay import Track
 
 UNTRUSTED = 1.0 / 3.0  # share of scans: more, and nobody should build on the run
 UNTRUSTED_STATUS = 6  # exit status with --strict
+MOST_USUAL_M = 100.0  # median range; more: they are in mm, or in cm
 SURE = 0.99  # probability from which on a mounting is named as the one
 _log = logging.getLogger(__name__)
 
@@ -46,6 +48,8 @@ def tell(footage: Footage, *, strict: bool) -> list[Mounting]:
     """
     metadata = footage.stream.metadata
     say(understood(footage), highlight=False)
+    if words := units(footage):
+        _log.warning("%s: %s", footage.title, words)
     if metadata.laser is None or not metadata.odometry:
         return []
     found = footage.tested.told() if footage.tested else []
@@ -64,7 +68,8 @@ def understood(footage: Footage) -> str:
     rate = (count - 1) / footage.duration_s if footage.duration_s > 0.0 else 0.0
     extra = metadata.extra
     of = str(extra.get("scan") or extra.get("message") or "features")
-    parts = [f"{metadata.source}, {of}"]
+    echoes = f" ({extra['echoes']})" if "echoes" in extra else ""
+    parts = [f"{metadata.source}, {of}{echoes}"]
     if laser := metadata.laser:
         fov = math.degrees(laser.angles[-1] - laser.angles[0])
         parts.append(
@@ -75,9 +80,25 @@ def understood(footage: Footage) -> str:
     if laser:
         by = f"by {metadata.mounting}" if metadata.mounting else "assumed"
         parts.append(f"scanner at {_place(laser.T_robot_laser)} on the robot, {by}")
+    if names := extra.get("ignored", {}).get(NAMES):
+        parts.append(f"{names} {NAMES} passed over")
     odometry = str(extra.get("odometry") or "none")
     parts.append(f"odometry: {odometry if metadata.odometry else 'none'}")
+    if passed := extra.get("passed_over"):
+        parts.append(f"passed over (--scan, --odometry): {', '.join(passed)}")
     return f"{footage.title}: {'; '.join(parts)}."
+
+
+def units(footage: Footage) -> str:
+    """What to say of ranges that cannot be in m; "" where they can."""
+    if footage.usual_m <= MOST_USUAL_M:
+        return ""
+    laser = footage.stream.metadata.laser
+    limit = f" (range_max is {laser.range_max:g})" if laser else ""
+    return (
+        f"ranges look like mm: the median is {footage.usual_m:.0f}{limit}; they must be in m: "
+        "correct the driver, or divide by 1000"
+    )
 
 
 def _place(T_robot_laser: Float) -> str:
@@ -111,8 +132,8 @@ def doubt(metadata: StreamMetadata, found: Sequence[Mounting]) -> str:
     if best.as_read:
         return ask and (
             f"{ask}Scans agree with odometry as it was read, ahead and counter-clockwise "
-            f"({_odds(found)}, {_cm(best)} apart). If it is not at the robot's centre, say where: "
-            f"--laser x,y,{flags(metadata, best).rpartition(',')[2]}"
+            f"to 5° ({_odds(found)}, {_cm(best)} apart). If it is not at the robot's centre, say "
+            f"where: --laser x,y,{flags(metadata, best).rpartition(',')[2]}"
         )
     return (
         f"{ask}Scans contradict odometry as the log was read ({_cm(as_read)} apart) and agree "
@@ -153,14 +174,15 @@ def distrust(track: Track, footage: Footage, found: Sequence[Mounting]) -> str:
     rest: list[str] = []
     metadata = footage.stream.metadata
     stands = bool(metadata.extra.get(STANDS_STILL))
-    if stands:
-        causes.append("its odometry stands still while scans move")
+    causes += filter(None, ("its odometry stands still while scans move" * stands, units(footage)))
     if found and not found[0].as_read and found[0].probability > SURE:
         causes.append(f"the scanner is mounted otherwise: {flags(metadata, found[0])}")
     elif not found or found[0].probability <= SURE or not metadata.mounting:
         rest.append("a wrong mounting (--laser x,y,yaw_deg, --flip)")
     if footage.empty > UNTRUSTED:
         causes.append(f"{footage.empty:.0%} of the scans return less than 10 % of beams")
+        if not units(footage):
+            rest.append("ranges in mm, all beyond range_max")
     repaired = [key for key in WORDS if metadata.extra.get(key)]
     if any("stamp" in key or "clock" in key for key in repaired):
         causes.append("the times of the log, which had to be repaired")

@@ -19,6 +19,7 @@ from slam.days.history import History
 from slam.days.session import Session, keep, read_history
 from slam.errors import InvalidValueError
 from slam.frames import EPOCH, NS_PER_S, Stream
+from slam.logs.bag_topics import Asked
 from slam.system import create
 from slam.tracker.tracker import Tracker
 
@@ -103,6 +104,7 @@ class Log:
     strict       refuse repairs, a mounting that its scans contradict, and a run that nobody trusts
     text_format  describes a text log
     laser, flip  how the scanner is mounted, where the log does not say it: ``mount_of``
+    scan, odometry  topics of a bag: ``slam.logs.bag_topics.Asked``
     """
 
     path: Path
@@ -110,6 +112,8 @@ class Log:
     text_format: Path | None = None
     laser: str | None = None
     flip: bool = False
+    scan: str | None = None
+    odometry: str | None = None
 
 
 def on_log(
@@ -126,7 +130,7 @@ def on_log(
     with working(f"reading {path.name}"):
         footage = of_log(
             path, strict=log.strict, text_format=log.text_format,
-            mount=mount_of(log.laser), flip=log.flip,
+            mount=mount_of(log.laser), flip=log.flip, asked=Asked(log.scan, log.odometry),
         )  # fmt: skip
     found = tell(footage, strict=log.strict)
     show = footage.show(names)

@@ -25,16 +25,16 @@ from slam.frames import (
     Stream,
     StreamMetadata,
 )
-from slam.logs.bag_laser import Laser, PoseTrack, Stamped, increment_covariance, mounting
-from slam.logs.bag_survey import Survey, stamp_of, survey
-from slam.logs.bag_topics import SCAN, Bag, Topics, choose
+from slam.logs.bag_head import Head, messages_of
+from slam.logs.bag_laser import Laser, PoseTrack, Stamped, increment_covariance, stamp_of
+from slam.logs.bag_survey import Survey, survey
+from slam.logs.bag_topics import ECHOES, SCAN, Asked, Bag, Topics, choose
 from slam.logs.repairs import NO_ODOMETRY, Repairs
-from slam.logs.ros_numbers import yaw_of
+from slam.logs.ros_numbers import planar
 from slam.logs.text import about
 
 PATIENCE_NS = 2 * NS_PER_S  # how long a scan waits for its odometry
 PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])
-MOST_POSE_M = 1e9  # from the origin of its frame, which may be that of a map of the earth
 _log = logging.getLogger(__name__)
 
 
@@ -45,10 +45,10 @@ def frames_of(
 
     Raises ``LogFormatError`` for messages that cannot be, and where no scan has odometry.
     """
-    names = (topics.scan, topics.odometry, topics.truth, topics.increment, topics.labels)
+    names = [topics.scan, topics.odometry, topics.truth, topics.increment, topics.labels]
     with Bag(path, Repairs(path)) as bag:
         assembly = Assembly(topics, laser, epoch_ns, wait=True)
-        messages = bag.messages({name for name in names if name})
+        messages = messages_of(bag, topics, names)
         for topic, log_ns, message, stamp_ns in known.in_order(messages, topics.scan):
             with about(path, bag.at):
                 assembly.take(topic, log_ns, message, stamp_ns)
@@ -174,19 +174,6 @@ class Assembly:
             raise LogFormatError(path, "no scan lies within the time of the odometry")
 
 
-def planar(pose: Any) -> Float:
-    """(x m, y m, theta rad) of a geometry_msgs/Pose; ``InvalidValueError`` for what cannot be."""
-    p, q = pose.position, pose.orientation
-    if not max(abs(p.x), abs(p.y)) <= MOST_POSE_M or not math.isfinite(p.x + p.y):
-        raise InvalidValueError(
-            f"pose.position: expected a place within {MOST_POSE_M:g} m, got {p.x:g}, {p.y:g}"
-        )
-    if not math.isfinite(q.x + q.y + q.z + q.w):
-        got = f"{q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}"
-        raise InvalidValueError(f"pose.orientation: expected finite numbers, got {got}")
-    return np.array([p.x, p.y, yaw_of(q.x, q.y, q.z, q.w)])
-
-
 def _pose(message: Any, stamp_ns: int) -> Stamped:
     pose = message.pose
     return Stamped(stamp_ns=stamp_ns, pose=planar(getattr(pose, "pose", pose)))
@@ -235,10 +222,6 @@ def _labels(message: Any) -> BeamLabels:
     )
 
 
-PROBE_NS = 20 * NS_PER_S  # how far the transform to the laser is looked for
-_BASE = "base_link"  # of REP 105
-
-
 def read_bag(
     path: str | Path,
     *,
@@ -273,26 +256,38 @@ def read_bag(
 
     Raises ``LogFormatError`` that names the file for anything that is not such a bag.
     """
-    path = Path(path)
+    path, asked = Path(path), Asked(scan=scan, odometry=odometry)
     repairs = Repairs(path, strict)
     with Bag(path, repairs) as bag:
-        topics = choose(bag, scan=scan, odometry=odometry, truth=truth, labels=labels)
+        head = Head(bag, *choose(bag, asked, truth=truth, labels=labels))
+        topics = head.decided()
+        mount, mounted = head.placed(topics)
         known = survey(bag, topics, repairs)
-        laser, mounted = _probe(bag, topics, known)
+        laser = _laser(bag, topics, known, mount)
         epoch_ns = _epoch_ns(bag, topics)
+        kind = bag.topics[topics.scan][0]
         source = "rosbag1" if bag.is_ros1 else "rosbag2"
-    extra: dict[str, Any] = {"file": path.name, "scan": topics.scan, "odometry": topics.odometry}
+    extra: dict[str, Any] = {
+        "file": path.name,
+        "scan": _named(topics, topics.scan, topics.frame),
+        "odometry": topics.odometry and _named(topics, topics.odometry, topics.child),
+    }
     if laser.turned:
         extra["turned"] = laser.turned
+    if kind == ECHOES:
+        extra["echoes"] = "first echo of each beam"
+    if topics.passed:
+        extra["passed_over"] = list(topics.passed)
     if known.varies:
         extra["varies"] = known.varies
         _log.warning("%s: scans differ, each is read by its own header: %s", path, known.varies)
-    count = len(known.ranks)
+    count, why = len(known.ranks), ""
     if topics.odometry is None:
-        repairs.note(NO_ODOMETRY, "no message of nav_msgs/msg/Odometry", None, count)
+        why = head.without_odometry()
+        repairs.note(NO_ODOMETRY, why, None, count)
     if known.stands:
         topics = replace(topics, odometry=None, increment=None)
-    repairs.warn()
+    repairs.warn(why)
     extra |= {kind: n for kind, n in repairs.facts().items() if n}
     metadata = StreamMetadata(
         source=source,
@@ -309,6 +304,20 @@ def read_bag(
     )
 
 
+def _named(topics: Topics, topic: str, frame: str) -> str:
+    """The topic, with its frame where others share it."""
+    return (
+        f"{topic}:{frame}" if any(one.startswith(f"{topic}:") for one in topics.passed) else topic
+    )
+
+
+def frames_of_odometry(path: Path) -> tuple[str, str]:
+    """In which the odometry of a bag is, and that moves, as ``read_bag`` reads it; "": unsaid."""
+    with Bag(path) as bag:
+        head = Head(bag, *choose(bag, Asked(), truth=None, labels=False))
+        return head.frames(head.decided())
+
+
 def _epoch_ns(bag: Bag, topics: Topics) -> int:
     """Time of the bag at second 0 of the simulation that it is of; 0 for every other bag."""
     if topics.began is None:
@@ -320,54 +329,22 @@ def _epoch_ns(bag: Bag, topics: Topics) -> int:
     return 0
 
 
-def _probe(bag: Bag, topics: Topics, surveyed: Survey) -> tuple[Laser, str]:  # noqa: C901 (one branch a kind of file)
-    """The scanner, from the first messages of the bag; where its mounting comes from."""
-    named = (topics.scan, topics.odometry, topics.turns, *topics.transforms)
-    wanted = {name for name in named if name is not None}
-    transforms: dict[tuple[str, str], Any] = {}
+def _laser(bag: Bag, topics: Topics, known: Survey, mount: tuple[Float, bool]) -> Laser:
+    """The scanner, of the first scans that count and the turns of the first."""
     scans: list[Any] = []
     turns: list[Any] = []
-    # where nobody says what moves: the usual name, or else the laser itself
-    robot = _BASE if topics.odometry is None else None
-    mount, start_ns = None, None
-    tried = (0, robot)  # so many transforms, to there
-    for topic, log_ns, message, _ in surveyed.in_order(bag.messages(wanted), topics.scan):
-        start_ns = log_ns if start_ns is None else start_ns
-        with about(bag.path, bag.at):
-            if topic == topics.scan:
-                scans = [*scans, message][:2]
-            elif topic == topics.turns:
-                turns.append(message)
-            elif topic == topics.odometry:
-                robot = _frame_name(message.child_frame_id)
-            elif topic in topics.transforms:
-                for t in message.transforms:
-                    edge = (_frame_name(t.header.frame_id), _frame_name(t.child_frame_id))
-                    transforms[edge] = t.transform
-            if scans and robot is not None:
-                laser = _frame_name(scans[0].header.frame_id)
-                if mount is not None or tried != (len(transforms), robot):
-                    tried = (len(transforms), robot)
-                    mount = mounting(transforms, robot, laser)
-                known = mount is not None or laser == robot or log_ns - start_ns > PROBE_NS
-                if known and (len(scans) > 1 or topics.turns is None):
-                    break
+    messages = messages_of(bag, topics, (topics.scan, topics.turns))
+    for topic, _, message, _ in known.in_order(messages, topics.scan):
+        (scans if topic == topics.scan else turns).append(message)
+        if len(scans) > (topics.turns is not None):
+            break
     if not scans:
         raise LogFormatError(bag.path, f"no scan on {topics.scan}")
-    frame = _frame_name(scans[0].header.frame_id)
-    said = f"{robot} -> {frame} of {' and '.join(topics.transforms)}" if mount is not None else ""
-    if mount is None and frame == robot:
-        said = f"the scan's own frame, {frame}"
     with about(bag.path, f"topic {topics.scan}, message 1"):
         times = [stamp_of(scan, 0) for scan in scans]
         end = times[1] if len(times) > 1 else math.inf
         turns = [turn for turn in turns if times[0] <= stamp_of(turn, 0) < end]
-        mount = (np.zeros(3), False) if mount is None else mount
-        return Laser(scans[0], turns, mount, saturates=surveyed.saturates), said
-
-
-def _frame_name(name: str) -> str:
-    return name.lstrip("/")
+        return Laser(scans[0], turns, mount, saturates=known.saturates)
 
 
 __all__ = ["SCAN", "read_bag"]

@@ -2,8 +2,8 @@
 """A bag's scanner and odometry: geometry, beam times, mounting, poses at the times of its scans."""
 
 import math
-from collections import defaultdict, deque
-from collections.abc import Mapping, Sequence
+from collections import deque
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -14,7 +14,13 @@ from slam import se2
 from slam.checked import possible
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, Float, LaserSpec, Scan
-from slam.logs.ros_numbers import round_angle, round_number, round_period, yaw_of
+from slam.logs.ros_numbers import round_angle, round_number, round_period
+
+
+def stamp_of(message: Any, log_ns: int) -> int:
+    """Of the header; drivers that leave it empty get the time of the log."""
+    stamp = message.header.stamp
+    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) or log_ns
 
 
 @dataclass(slots=True)
@@ -118,8 +124,6 @@ def _possible(Q: Float) -> Float:
 FARTHEST_M = 1e4
 MAX_BEAMS = 100_000
 MOST_SHAPES = 1000  # headers of a scanner that are kept
-MOST_TRANSFORMS = 2000  # between frames; of a robot with arms, 200
-Matrix = list[list[float]]
 
 
 class Laser:
@@ -282,74 +286,3 @@ def _degrees(angle: float) -> float:
 
 def _stamp_ns(message: Any) -> int:
     return int(message.header.stamp.sec) * NS_PER_S + int(message.header.stamp.nanosec)
-
-
-def mounting(
-    transforms: Mapping[tuple[str, str], Any], robot: str, laser: str
-) -> tuple[Float, bool] | None:
-    """``T_robot_laser`` and whether the laser hangs upside down; None without a way to it.
-
-    transforms  (parent, child) -> geometry_msgs/Transform
-
-    Raises ``InvalidValueError`` for more than ``MOST_TRANSFORMS``.
-    """
-    if len(transforms) > MOST_TRANSFORMS:
-        raise InvalidValueError(f"more than {MOST_TRANSFORMS} transforms between frames")
-    chain = _chain(transforms, robot, laser)
-    if chain is None:
-        return None
-    chain = [link for link in chain if not _is_identity(link)] or chain[:1]
-    if len(chain) == 1:
-        t, q = chain[0].translation, chain[0].rotation
-        if q.x == 0.0 and q.y == 0.0:
-            return np.array([t.x, t.y, yaw_of(q.x, q.y, q.z, q.w)]), False
-    turn: Matrix = [[1.0, 0.0, 0.0], [0.0, 1.0, 0.0], [0.0, 0.0, 1.0]]
-    at = [0.0, 0.0, 0.0]
-    for link in chain:
-        t = (link.translation.x, link.translation.y, link.translation.z)
-        at = [at[i] + sum(turn[i][k] * t[k] for k in range(3)) for i in range(3)]
-        step = _matrix(link.rotation)
-        turn = [
-            [sum(turn[i][k] * step[k][j] for k in range(3)) for j in range(3)] for i in range(3)
-        ]
-    yaw = math.atan2(turn[1][0], turn[0][0])
-    return np.array([at[0], at[1], yaw]), turn[2][2] < 0.0
-
-
-def _is_identity(link: Any) -> bool:
-    t, q = link.translation, link.rotation
-    return (t.x, t.y, t.z, q.x, q.y, q.z, q.w) == (0.0, 0.0, 0.0, 0.0, 0.0, 0.0, 1.0)
-
-
-def _chain(transforms: Mapping[tuple[str, str], Any], robot: str, laser: str) -> list[Any] | None:
-    """The transforms from robot down to laser, by breadth-first search."""
-    below = defaultdict[str, list[tuple[str, Any]]](list)
-    for (parent, child), transform in transforms.items():
-        below[parent].append((child, transform))
-    above: dict[str, tuple[str, Any]] = {}
-    rim = [robot]
-    for here in rim:
-        for child, transform in below[here]:
-            if child not in above and child != robot:
-                above[child] = here, transform
-                rim.append(child)
-    if laser not in above:
-        return None
-    chain = []
-    while laser != robot:
-        laser, transform = above[laser]
-        chain.append(transform)
-    return chain[::-1]
-
-
-def _matrix(q: Any) -> Matrix:
-    x, y, z, w = q.x, q.y, q.z, q.w
-    norm = x * x + y * y + z * z + w * w
-    if not (math.isfinite(norm) and norm > 1e-12):
-        raise InvalidValueError("a transform with a quaternion of length zero")
-    s = 2.0 / norm
-    return [
-        [1.0 - s * (y * y + z * z), s * (x * y - z * w), s * (x * z + y * w)],
-        [s * (x * y + z * w), 1.0 - s * (x * x + z * z), s * (y * z - x * w)],
-        [s * (x * z - y * w), s * (y * z + x * w), 1.0 - s * (x * x + y * y)],
-    ]

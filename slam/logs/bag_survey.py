@@ -12,8 +12,9 @@ import numpy as np
 from numpy.typing import NDArray
 
 from slam.errors import LogFormatError
-from slam.frames import NS_PER_S, to_s
-from slam.logs.bag_laser import shape_of
+from slam.frames import to_s
+from slam.logs.bag_head import messages_of
+from slam.logs.bag_laser import shape_of, stamp_of
 from slam.logs.bag_topics import Bag, Topics
 from slam.logs.repairs import (
     AT_RANGE_MAX,
@@ -33,12 +34,6 @@ SHORT = 0.5  # of the usual number of beams and of the usual field of view; less
 NEARLY_MAX = 0.95  # of range_max, from where returns are none that say "nothing"
 MASS = 0.005  # share of all beams exactly at range_max: one beam a scan is its farthest wall
 Message = tuple[str, int, Any]
-
-
-def stamp_of(message: Any, log_ns: int) -> int:
-    """Of the header; drivers that leave it empty get the time of the log."""
-    stamp = message.header.stamp
-    return int(stamp.sec) * NS_PER_S + int(stamp.nanosec) or log_ns
 
 
 @dataclass(kw_only=True)
@@ -90,7 +85,7 @@ def survey(bag: Bag, topics: Topics, repairs: Repairs) -> Survey:
     }
     shapes: list[tuple[int, float, float, float]] = []
     full, standing = _Full(), Standing()
-    for topic, log_ns, message in bag.messages(clocks):
+    for topic, log_ns, message in messages_of(bag, topics, clocks):
         with about(bag.path, bag.at):
             clocks[topic].append((stamp_of(message, log_ns), log_ns))
             if topic == topics.scan:
@@ -114,6 +109,7 @@ def survey(bag: Bag, topics: Topics, repairs: Repairs) -> Survey:
     if len(whole) < len(shapes):
         why = f"topic {topics.scan}: {len(shapes) - len(whole)} scans without beams or short ones"
         repairs.note(SHORT_SCANS, why, None, len(shapes) - len(whole))
+    _tell_others(bag, topics, len(shapes), repairs)
     found.varies = _spread([shapes[k] for k in whole])
     if topics.odometry is not None and standing.stands:
         found.stands = True
@@ -126,6 +122,15 @@ def survey(bag: Bag, topics: Topics, repairs: Repairs) -> Survey:
     odometry = None if found.stands else topics.odometry
     found.ranks = _ranked(bag, found.stamps_ns, whole, (topics.scan, odometry), repairs)
     return found
+
+
+def _tell_others(bag: Bag, topics: Topics, own: int, repairs: Repairs) -> None:
+    """Scans of another frame, where the choice of the scanner has not told them."""
+    scan = topics.scan
+    others = bag.topics[scan][1] - own
+    if others > 0 and not any(name.startswith(f"{scan}:") for name in topics.passed):
+        why = f"topic {scan}: {others} scans of another frame than {topics.frame}"
+        repairs.note(LEFT_OUT, why, None, others)
 
 
 class _Full:
@@ -231,8 +236,8 @@ def _ranked(
         begin, end = min(stamps_ns[odometry]), max(stamps_ns[odometry])
         within = [stamp for stamp in kept if begin <= stamp <= end]
         ranges = (
-            f"scans are of {to_s(kept[0]):.9g} to {to_s(kept[-1]):.9g} s, "
-            f"odometry is of {to_s(begin):.9g} to {to_s(end):.9g} s"
+            f"scans are of {to_s(kept[0]):.12g} to {to_s(kept[-1]):.12g} s, "
+            f"odometry is of {to_s(begin):.12g} to {to_s(end):.12g} s"
         )
         if not within:
             raise LogFormatError(

@@ -6,8 +6,11 @@ from collections.abc import Collection, Iterator
 from contextlib import ExitStack, contextmanager, suppress
 from dataclasses import dataclass
 from pathlib import Path
+from types import SimpleNamespace
 from typing import Any
 
+import numpy as np
+from numpy.typing import NDArray
 from rosbags.rosbag1 import Reader as ReaderOfRos1
 from rosbags.rosbag2 import Reader
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
@@ -17,9 +20,11 @@ from slam.bounded import check_file
 from slam.errors import LogFormatError, MissingPathError, MobiliaError
 from slam.logs import bag_files, unpacking
 from slam.logs.bag_files import CURES, METADATA, CutShortError, suffix_of
+from slam.logs.foreign import what_instead
 from slam.logs.repairs import LOST, NO_END, Repairs
 
 SCAN = "sensor_msgs/msg/LaserScan"
+ECHOES = "sensor_msgs/msg/MultiEchoLaserScan"
 ODOMETRY = "nav_msgs/msg/Odometry"
 INCREMENT = "geometry_msgs/msg/PoseWithCovarianceStamped"
 POSE = "geometry_msgs/msg/PoseStamped"
@@ -55,6 +60,8 @@ def failing_as_ours(path: Path, where: str = "") -> Iterator[None]:
     except OSError as error:
         raise LogFormatError(path, f"cannot be read: {error.strerror or error}") from error
     except Exception as error:  # parsers of foreign bytes fail in every way
+        if what := what_instead(path):
+            raise LogFormatError(path, what) from error
         text = " ".join(str(error).split())[:200] or type(error).__name__
         cure = f" ({CURES[suffix_of(path)]} may mend it)" if suffix_of(path) in CURES else ""
         raise LogFormatError(path, f"{where}corrupt or truncated bag: {text}{cure}") from error
@@ -166,12 +173,49 @@ class Bag:
             self.at = f"topic {topic}, message {count[topic]}"
             with failing_as_ours(self.path, f"{self.at}: "):
                 decoded = self._decode(data, kind)
+                if kind == ECHOES:
+                    decoded = first_echoes(decoded)
             yield topic, log_ns, decoded
+
+
+def first_echoes(message: Any) -> Any:
+    """A LaserScan of the first echo of each beam; a beam without any has no return."""
+
+    def first(beams: Any, nothing: float) -> NDArray[np.float32]:
+        echoes = (beam.echoes for beam in beams)
+        return np.array([e[0] if len(e) else nothing for e in echoes], dtype=np.float32)
+
+    fields = {
+        "ranges": first(message.ranges, np.inf), "intensities": first(message.intensities, 0.0)
+    }  # fmt: skip
+    return SimpleNamespace(**{**vars(message), **fields})
+
+
+@dataclass(frozen=True)
+class Asked:
+    """What is to be read, where somebody says it, as TOPIC or TOPIC:FRAME.
+
+    scan      FRAME: of the scanner, where several share the topic
+    odometry  FRAME: that moves; of /tf: that in which the odometry is
+    """
+
+    scan: str | None = None
+    odometry: str | None = None
 
 
 @dataclass(frozen=True, kw_only=True)
 class Topics:
-    """What is read; None where a bag does not have it."""
+    """What is read; None where a bag does not have it.
+
+    frame   of the scans, "" for any
+    child   frame of the odometry that moves, "" for any
+    way     steps through /tf from the frame of odometry to the robot's, where no topic has it:
+            ``slam.logs.bag_head.messages_of`` makes one of them
+    passed  what else there was of scans and odometry, as ``Asked`` names it
+
+    Before the frames are known (``slam.logs.bag_head``), ``odometry`` and the frames are those that
+    were asked for.
+    """
 
     scan: str
     odometry: str | None
@@ -181,21 +225,26 @@ class Topics:
     labels: str | None
     transforms: tuple[str, ...]
     began: str | None = None
+    frame: str = ""
+    child: str = ""
+    way: tuple[Any, ...] = ()
+    passed: tuple[str, ...] = ()
 
 
-def choose(
-    bag: Bag, *, scan: str | None, odometry: str | None, truth: str | None, labels: bool
-) -> Topics:
-    """Topics by the names asked for, else by type and the likeliest name.
+def choose(bag: Bag, asked: Asked, *, truth: str | None, labels: bool) -> tuple[Topics, list[str]]:
+    """Topics by the names asked for, else by type and the likeliest name; all of odometry.
 
     A bag without any message of odometry has none; a scanner carried in the hand leaves such bags.
     Raises ``LogFormatError`` that lists the bag's topics when there is no such topic, or when the
     one asked for is of another type.
     """
-    wanted_scan = _pick(bag, scan, (SCAN,), "scan")
-    wanted_odometry = None
-    if odometry is not None or any(k == ODOMETRY and count for k, count in bag.topics.values()):
-        wanted_odometry = _pick(bag, odometry, (ODOMETRY,), "odom")
+    scan, frame = _parts(asked.scan)
+    odometry, child = _parts(asked.odometry)
+    wanted = _pick(bag, scan, (SCAN, ECHOES), "scan", beside=odometry or "")[0]
+    drives = []
+    on_tf = odometry is not None and _kind(bag, odometry) in TRANSFORMS
+    if not on_tf and (odometry or any(k == ODOMETRY and n for k, n in bag.topics.values())):
+        drives = _pick(bag, odometry, (ODOMETRY,), "odom", beside=wanted)
 
     def there(name: str, kind: str) -> str | None:
         return name if _kind(bag, name) == kind else None
@@ -203,27 +252,54 @@ def choose(
     truths = [
         name
         for name, (kind, _) in sorted(bag.topics.items())
-        if kind in (POSE, ODOMETRY) and "truth" in name and name != wanted_odometry
+        if kind in (POSE, ODOMETRY) and "truth" in name and name not in drives[:1]
     ]
     if truth is not None:
-        truths = [_pick(bag, truth, (POSE, ODOMETRY), "truth")]
+        truths = _pick(bag, truth, (POSE, ODOMETRY), "truth")[:1]
     return Topics(
-        scan=wanted_scan,
-        odometry=wanted_odometry,
+        scan=wanted,
+        odometry=odometry,
         truth=truths[0] if truths else None,
-        turns=there(f"{wanted_scan}_turn", SCAN),
-        increment=there(f"{wanted_odometry}_increment", INCREMENT),
+        turns=there(f"{wanted}_turn", SCAN),
+        increment=None,
         labels=there(LABELS, CLOUD) if labels else None,
-        transforms=tuple(n for n, (kind, _) in sorted(bag.topics.items()) if kind in TRANSFORMS),
+        transforms=_transforms(bag, wanted),
         began=there(BEGAN, TIME),
-    )
+        frame=frame,
+        child=child,
+    ), [name for name in drives if name not in truths]
+
+
+def _parts(asked: str | None) -> tuple[str | None, str]:
+    """Topic and frame of TOPIC:FRAME."""
+    if asked is None:
+        return None, ""
+    topic, _, frame = asked.partition(":")
+    return topic, frame
+
+
+def shared(name: str, other: str) -> int:
+    """How many namespaces two topics have in common."""
+    mine, theirs = (topic.strip("/").split("/")[:-1] for topic in (name, other))
+    alike = [a == b for a, b in zip(mine, theirs, strict=False)]
+    return [*alike, False].index(False)
+
+
+def _transforms(bag: Bag, scan: str) -> tuple[str, ...]:
+    """Topics of transforms but those of other robots: /b/tf, where /a/scan has an /a/tf."""
+    names = sorted(name for name, (kind, _) in bag.topics.items() if kind in TRANSFORMS)
+    most = max((shared(name, scan) for name in names), default=0)
+    return tuple(n for n in names if shared(n, scan) == most or n.count("/") == 1)
 
 
 def _kind(bag: Bag, topic: str) -> str:
     return bag.topics.get(topic, ("", 0))[0]
 
 
-def _pick(bag: Bag, asked: str | None, kinds: tuple[str, ...], hint: str) -> str:
+def _pick(
+    bag: Bag, asked: str | None, kinds: tuple[str, ...], hint: str, beside: str = ""
+) -> list[str]:
+    """The topic asked for, or all of these kinds, the likeliest first: ``beside`` which one."""
     listed = ", ".join(f"{name} ({kind})" for name, (kind, _) in sorted(bag.topics.items()))
     if asked is not None:
         if asked not in bag.topics:
@@ -232,9 +308,11 @@ def _pick(bag: Bag, asked: str | None, kinds: tuple[str, ...], hint: str) -> str
             raise LogFormatError(
                 bag.path, f"topic {asked} is {_kind(bag, asked)}, expected {' or '.join(kinds)}"
             )
-        return asked
+        return [asked]
     found = [
         (
+            -shared(name, beside),
+            kinds.index(kind),
             name != f"/{hint}",
             "truth" in name,
             hint not in name,
@@ -247,4 +325,12 @@ def _pick(bag: Bag, asked: str | None, kinds: tuple[str, ...], hint: str) -> str
     ]
     if not found:
         raise LogFormatError(bag.path, f"no message of type {kinds[0]}; topics: {listed or 'none'}")
-    return min(found)[-1]
+    return [one[-1] for one in sorted(found)]
+
+
+def scanners(bag: Bag) -> list[str]:
+    """All topics of whole scans."""
+    return [
+        name for name, (kind, count) in sorted(bag.topics.items())
+        if kind in (SCAN, ECHOES) and count and not name.endswith("_turn")
+    ]  # fmt: skip

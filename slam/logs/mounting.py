@@ -24,6 +24,8 @@ SEEN_IN_BOTH = 0.7  # share of the points, those nearest to the other scan's
 FLOOR_M = 0.03  # to which points lie on each other at best: spacing, noise, odometry
 SURFACES = 3.0  # a pair of scans says as much as so many independent distances: three numbers
 LEAST_PAIRS = 5
+BETWEEN_DEG = 5  # from a quarter turn; less may be the odometry's own
+SURE = math.log(99.0)  # by which one between must be likelier
 
 
 def remounted(stream: Stream, T_robot_laser: Float | None, *, flip: bool, by: str) -> Stream:
@@ -73,9 +75,9 @@ def remounted(stream: Stream, T_robot_laser: Float | None, *, flip: bool, by: st
 class Mounting:
     """One way in which the scanner may be mounted, against how the log was read.
 
-    turned_deg   0, 90, 180 or 270 counter-clockwise from there
+    turned_deg   0, 90, 180 or 270 counter-clockwise from there, or a turn between that fits better
     flipped      its beams count the other way round
-    probability  of this one, if it is one of the eight
+    probability  of this one, if it is one of those that were tried
     apart_m      m, root mean square, how far two scans' points then lie apart
     """
 
@@ -88,6 +90,9 @@ class Mounting:
     def as_read(self) -> bool:
         """Whether it is the one that the log was read with."""
         return self.turned_deg == 0 and not self.flipped
+
+
+Pair = tuple[Float, Float, Float]  # motion (3,), points before and after it
 
 
 class MountingTest:
@@ -113,7 +118,7 @@ class MountingTest:
         self._keys.append((pose, points.astype(np.float64)))
         self._mount = frame.scan.spec.T_robot_laser
 
-    def pairs(self) -> list[tuple[Float, Float, Float]]:
+    def pairs(self) -> list[Pair]:
         """Motion (3,) of the robot and the points before and after it; those of most motion."""
         found: list[tuple[float, int, Float, Float, Float]] = []
         for (before, old), (after, new) in zip(self._keys, self._keys[1:], strict=False):
@@ -125,7 +130,9 @@ class MountingTest:
         return [one[2:] for one in most]
 
     def told(self) -> list[Mounting]:
-        """All eight, the likeliest first; [] where too little was driven to tell.
+        """All eight, and one between them where it is much likelier; the likeliest first.
+
+        [] where too little was driven to tell.
 
         Each pair of scans weighs as ``SURFACES`` distances of one Gaussian of unknown width:
         thousands of beams on one wall say it once.
@@ -134,10 +141,14 @@ class MountingTest:
         if len(pairs) < LEAST_PAIRS:
             return []
         ways = [(turned, flip) for flip in (False, True) for turned in (0, 90, 180, 270)]
-        squares = np.array([[_square(pair, self._mount, *way) for way in ways] for pair in pairs])
-        logs = -0.5 * SURFACES * np.log(squares + FLOOR_M**2).sum(axis=0)
-        odds = np.exp(logs - logs.max())
-        apart = np.sqrt(np.median(squares, axis=0))
+        found = [self._fit(pairs, *way) for way in ways]
+        best = found.index(max(found))
+        between = self._between(pairs, *ways[best])
+        if between != ways[best]:
+            ways.append(between)
+            found.append(self._fit(pairs, *between))
+        odds = np.exp(np.array([log for log, _ in found]) - max(found)[0])
+        apart = np.array([apart_m for _, apart_m in found])
         mountings = [
             Mounting(turned_deg=turned, flipped=flip, probability=p, apart_m=m)
             for (turned, flip), p, m in zip(
@@ -146,8 +157,26 @@ class MountingTest:
         ]
         return sorted(mountings, key=lambda one: -one.probability)
 
+    def _fit(self, pairs: list[Pair], turned_deg: int, flip: bool) -> tuple[float, float]:
+        """Log likelihood, and how far the points lie apart, m."""
+        squares = np.array([_square(pair, self._mount, turned_deg, flip) for pair in pairs])
+        log = -0.5 * SURFACES * float(np.log(squares + FLOOR_M**2).sum())
+        return log, math.sqrt(float(np.median(squares)))
 
-def _square(pair: tuple[Float, Float, Float], mount: Float, turned_deg: int, flip: bool) -> float:
+    def _between(self, pairs: list[Pair], turned_deg: int, flip: bool) -> tuple[int, bool]:
+        """The turn around this quarter that fits best, if it is another one."""
+        fits = {turned_deg: self._fit(pairs, turned_deg, flip)}
+        tried = range(turned_deg - 40, turned_deg + 41, 8)
+        for step in (8, 4, 2, 1):
+            fits |= {deg: self._fit(pairs, deg, flip) for deg in tried if deg not in fits}
+            best = max(fits, key=lambda deg: fits[deg])
+            tried = range(best - step // 2, best + step // 2 + 1, max(step // 2, 1))
+        likelier = fits[best][0] - fits[turned_deg][0] > SURE
+        other = likelier and abs(best - turned_deg) >= BETWEEN_DEG
+        return (best % 360 if other else turned_deg), flip
+
+
+def _square(pair: Pair, mount: Float, turned_deg: int, flip: bool) -> float:
     """Mean square m^2 between the points of two scans, where the motion between them puts them."""
     step, old, new = pair
     T_robot_laser = np.array([mount[0], mount[1], mount[2] + math.radians(turned_deg)])

@@ -41,7 +41,7 @@ WORDS = {
     NO_END: "{} files without an end, of a recorder that was killed, read up to the cut",
     LOST: "{} messages missing that the recording says it has",
     SHORT_SCANS: "{} scans without beams, or of less than half of them, left out",
-    LEFT_OUT: "{} scans outside the time of the odometry, or with the time of another, left out",
+    LEFT_OUT: "{} scans outside the odometry's time, or with another's time or frame, left out",
     AT_RANGE_MAX: "{} returns in a mass exactly at range_max read as none",
     NO_ODOMETRY: "no odometry: {} scans with that of a constant velocity",
 }
@@ -71,13 +71,14 @@ class Repairs:
         """The counts, of all kinds that most text logs can have, for ``StreamMetadata.extra``."""
         return {kind: self.counts[kind] for kind in WORDS if kind in USUAL or self.counts[kind]}
 
-    def warn(self) -> None:
-        """Say all of them in one line, if there are any."""
+    def warn(self, why: str = "") -> None:
+        """Say all of them in one line, if there are any; and why."""
         said = [
             words.format(self.counts[kind]) for kind, words in WORDS.items() if self.counts[kind]
         ]
         if said:
-            _log.warning("%s repaired: %s", self.path, "; ".join(said))
+            because = f" ({why})" if why else ""
+            _log.warning("%s repaired: %s%s", self.path, "; ".join(said), because)
 
 
 MAX_STEP_BACK_NS = NS_PER_S  # what clocks of several processes differ by

@@ -7,11 +7,15 @@ reader sees the same message as ever.
 """
 
 import math
+from typing import Any
 
 import numpy as np
 
 from slam import se2
+from slam.errors import InvalidValueError
+from slam.frames import Float
 
+MOST_POSE_M = 1e9  # from the origin of its frame, which may be that of a map of the earth
 _NEARBY = [(i, j) for r in range(5) for i in range(-r, r + 1) for j in range(-r, r + 1)
            if max(abs(i), abs(j)) == r]  # fmt: skip
 
@@ -21,6 +25,19 @@ def yaw_of(x: float, y: float, z: float, w: float) -> float:
     if x == 0.0 and y == 0.0:
         return se2.wrap(2.0 * math.atan2(z, w))
     return math.atan2(2.0 * (w * z + x * y), w * w + x * x - y * y - z * z)
+
+
+def planar(pose: Any) -> Float:
+    """(x m, y m, theta rad) of a geometry_msgs/Pose; ``InvalidValueError`` for what cannot be."""
+    p, q = pose.position, pose.orientation
+    if not max(abs(p.x), abs(p.y)) <= MOST_POSE_M or not math.isfinite(p.x + p.y):
+        raise InvalidValueError(
+            f"pose.position: expected a place within {MOST_POSE_M:g} m, got {p.x:g}, {p.y:g}"
+        )
+    if not math.isfinite(q.x + q.y + q.z + q.w):
+        got = f"{q.x:g}, {q.y:g}, {q.z:g}, {q.w:g}"
+        raise InvalidValueError(f"pose.orientation: expected finite numbers, got {got}")
+    return np.array([p.x, p.y, yaw_of(q.x, q.y, q.z, q.w)])
 
 
 def quaternion_of(theta: float) -> tuple[float, float]:

@@ -7,7 +7,6 @@ Messages are bytes of strangers: bounded and checked.
 import logging
 from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from types import SimpleNamespace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -19,9 +18,10 @@ from slam.estimate import Estimate, Raster
 from slam.frames import NS_PER_S, Float, Odometry
 from slam.frontend.odometry_prior import turned
 from slam.logs import unpacking
-from slam.logs.bag import MOST_POSE_M, PLANAR, planar
-from slam.logs.bag_survey import stamp_of
-from slam.logs.bag_laser import PoseTrack, Stamped
+from slam.logs.bag import PLANAR
+from slam.logs.bag_laser import PoseTrack, Stamped, stamp_of
+from slam.logs.bag_tf import planar_of
+from slam.logs.ros_numbers import MOST_POSE_M, planar
 from slam.ros.link import Link, Topic
 from slam.ros.messages import MAP, ODOM, MapMessage, StartMessage, TransformMessage
 from slam.ros.template import STORE
@@ -53,9 +53,7 @@ def transform_of(message: Any, parent: str, child: str) -> StampedPose | None:
     for link in message.transforms:
         names = (link.header.frame_id.lstrip("/"), link.child_frame_id.lstrip("/"))
         if names == (parent, child):
-            moved = link.transform
-            pose = SimpleNamespace(position=moved.translation, orientation=moved.rotation)
-            return StampedPose(stamp_of(link, 0), planar(pose))
+            return StampedPose(stamp_of(link, 0), planar_of(link.transform))
     return None
 
 

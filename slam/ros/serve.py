@@ -22,8 +22,8 @@ from slam.answers import asked, asked_map
 from slam.errors import MobiliaError
 from slam.frames import NS_PER_S, Frame
 from slam.logs.bag import Assembly
-from slam.logs.bag_laser import MOST_TRANSFORMS, Laser, mounting
-from slam.logs.bag_survey import stamp_of
+from slam.logs.bag_laser import Laser, stamp_of
+from slam.logs.bag_tf import MOST_TRANSFORMS, mounting
 from slam.logs.bag_topics import Topics
 from slam.ros.link import Link, Topic, open_link
 from slam.ros.messages import MAP, ODOM, IncrementMessage, MapMessage, TransformMessage

@@ -113,6 +113,20 @@ def test_a_run_that_nobody_trusts_names_the_likeliest_cause_first(without: Path)
     )
 
 
+@pytest.mark.parametrize("limit", [30.0, 30_000.0])
+def test_ranges_in_mm_are_told_and_named_first(tmp_path: Path, limit: float) -> None:
+    make = bags.Maker()
+    out = []
+    for k in range(4):
+        at = bags.START_NS + k * 10**8
+        ranges = [1500.0, 2500.0, 4000.0, math.inf]
+        out += [make.odometry(at, (0, 0, 0)), make.scan(at, ranges, range_max=limit)]
+    footage = of_log(bags.write_ros2(tmp_path / "mm", out))
+    assert log_words.units(footage).startswith("ranges look like mm: the median is 2500")
+    doubted = SimpleNamespace(name="mine", estimates=[SimpleNamespace(converged=False)])
+    assert "in order: ranges look like mm" in log_words.distrust(doubted, footage, [])  # type: ignore[arg-type]
+
+
 def test_a_strict_run_that_nobody_trusts_ends_with_its_own_status(
     monkeypatch: pytest.MonkeyPatch,
 ) -> None:

@@ -33,7 +33,7 @@ from slam.errors import OutputError
 from slam.evaluation import metrics
 from slam.frames import EPOCH, NS_PER_S
 from slam.logs import read_bag
-from slam.logs.bag_laser import mounting
+from slam.logs.bag_tf import mounting
 from slam.ros.template import EPOCH_NS
 from slam.trajectory import Trajectory, read_tum, write_tum
 

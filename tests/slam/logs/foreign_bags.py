@@ -63,6 +63,7 @@ class Maker:
         pose: Sequence[float],
         covariance: np.ndarray | None = None,
         topic: str = "/odom",
+        child: str = "base_link",
     ) -> Message:
         full = np.zeros((6, 6))
         if covariance is not None:
@@ -72,7 +73,7 @@ class Maker:
         message = self.new(
             kind,
             header=self.header(ns, "odom"),
-            child_frame_id="base_link",
+            child_frame_id=child,
             pose=self.new(
                 "geometry_msgs/msg/PoseWithCovariance",
                 pose=self.pose(*pose),
@@ -103,6 +104,22 @@ class Maker:
         )
         kind = "tf2_msgs/msg/TFMessage"
         return "/tf_static", kind, ns, self.new(kind, transforms=[stamped])
+
+    def moved(
+        self, ns: int, parent: str, child: str, pose: Sequence[float], topic: str = "/tf"
+    ) -> Message:
+        """A planar transform on /tf."""
+        x, y, theta = pose
+        turn = (0.0, 0.0, math.sin(theta / 2.0), math.cos(theta / 2.0))
+        return topic, *self.transform(ns, parent, child, (x, y, 0.0), turn)[1:]
+
+    def echoes(self, ns: int, beams: Sequence[Sequence[float]]) -> Message:
+        """A MultiEchoLaserScan."""
+        fields = vars(self.scan(ns, [1.0] * len(beams))[3])
+        kind = "sensor_msgs/msg/MultiEchoLaserScan"
+        told = [self.new("sensor_msgs/msg/LaserEcho", echoes=np.float32(b)) for b in beams]
+        fields = {k: v for k, v in fields.items() if not k.startswith("__")}
+        return "/echoes", kind, ns, self.new(kind, **{**fields, "ranges": told, "intensities": []})
 
 
 def write_ros2(path: Path, messages: Sequence[Message], storage: str = "sqlite3") -> Path:

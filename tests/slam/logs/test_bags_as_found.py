@@ -311,7 +311,7 @@ def test_two_clocks_without_a_common_time_are_told_with_both_ranges(tmp_path, dr
         return {**scan, "header": at}
 
     path = bags.write_ros2(tmp_path / "a", recorded(driven, simulated))
-    with pytest.raises(LogFormatError, match=r"scans are of 1 to 6\.\d+ s, odometry is of 1\.7e"):
+    with pytest.raises(LogFormatError, match=r"scans are of 1 to 6\.\d+ s, odometry is of 17\d+"):
         read_bag(path)
 
 

@@ -47,6 +47,17 @@ def test_whatever_was_assumed_the_right_mounting_is_found(
     assert best.as_read == (turned_deg == 0 and not flip)
 
 
+@pytest.mark.parametrize("turned_deg", [-130, 20, 45, 100])
+def test_a_turn_between_quarters_is_found(driven: list[Frame], turned_deg: int) -> None:
+    wrong = np.array([0.1, 0.0, math.radians(turned_deg)])
+    best = told(remounted(stream_of(driven), wrong, flip=False, by="a wrong flag"))[0]
+    off = (best.turned_deg + turned_deg + 180) % 360 - 180
+    assert abs(off) <= 3
+    assert not best.flipped
+    assert not best.as_read
+    assert best.probability > 0.99
+
+
 def test_along_a_bare_corridor_nothing_tells_ahead_from_behind() -> None:
     hall = World2D(rectangle(-300.0, -1.0, 300.0, 1.01))
     drive = Drive((0.0, 0.0, 0.0), ((0.5, 0.0, 30.0),))
