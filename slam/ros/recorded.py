@@ -3,28 +3,47 @@
 
 import logging
 import math
+from collections.abc import Iterable
+from contextlib import suppress
 from pathlib import Path
+from typing import Any
 
-from slam.errors import LogFormatError
+import numpy as np
+
+from slam.errors import InvalidValueError, LogFormatError
 from slam.estimate import Estimate
-from slam.frames import NS_PER_S, Frame
+from slam.frames import NS_PER_S, Frame, Odometry
+from slam.logs.bag_laser import PoseTrack, Stamped
+from slam.logs.bag_tf import (
+    MOST_TRANSFORMS,
+    Chain,
+    Edge,
+    Step,
+    bases,
+    edge_of,
+    ends_at,
+    way,
+)
 from slam.logs.bag_topics import INCREMENT, TRANSFORMS, Bag
 from slam.logs.text import about
 from slam.path import OnPath, PosePath
 from slam.ros.messages import MAP, ODOM
-from slam.ros.node import StampedPose, Statements, pose_of, transform_of
+from slam.ros.node import StampedPose, Statements, pose_of
 
 _log = logging.getLogger(__name__)
+ANOTHER_M = 0.05  # median; more: that is another odometry
+_TF = ("/tf", "/tf_static")
 APART_S = 60.0  # no stamp of the stack so near to any of the scans: its clock is another one
 
 
 def read_statements(
-    path: Path, *, pose: str | None = None, frames: tuple[str, str] = (MAP, ODOM)
-) -> list[StampedPose]:
-    """What a stack states in a bag, in the order of its stamps, each stamp once.
+    path: Path, *, pose: str | None = None, frames: tuple[str, str] = (MAP, ODOM), robot: str = ""
+) -> tuple[list[StampedPose], bool]:
+    """What a stack states in a bag, in the order of its stamps, each stamp once; whether poses.
 
     pose    topic of its poses in the map (PoseWithCovarianceStamped); None: transforms on /tf
     frames  names of the frames of map and odometry in those transforms
+    robot   that of the robot, followed where no way leads from map to odometry: those are poses
 
     What cannot be is left out, and told once. Raises ``LogFormatError`` for a bag without any.
     """
@@ -32,14 +51,14 @@ def read_statements(
     wrong: list[LogFormatError] = []
     with Bag(path) as bag:
         kinds = (INCREMENT,) if pose is not None else TRANSFORMS
-        topics = [
-            name for name, (kind, _) in bag.topics.items()
-            if kind in kinds and name == (pose if pose is not None else "/tf")
-        ]  # fmt: skip
-        for _, _, message in bag.messages(topics):
+        names = _TF if pose is None else (pose,)
+        topics = [name for name, (kind, _) in bag.topics.items() if kind in kinds and name in names]
+        steps = [] if pose is not None else _steps(bag, topics, frames, robot)
+        chain = Chain(steps)
+        for topic, log_ns, message in bag.messages(topics):
             try:
                 with about(path, bag.at):
-                    said = transform_of(message, *frames) if pose is None else pose_of(message)
+                    said = pose_of(message) if pose else _said(chain.newest(topic, message, log_ns))
             except LogFormatError as error:
                 wrong.append(error)
                 continue
@@ -51,7 +70,55 @@ def read_statements(
     if not found:
         what = f"{frames[0]} -> {frames[1]} on /tf" if pose is None else f"pose on {pose}"
         raise LogFormatError(path, f"no {what}; topics: {listed or 'none'}")
-    return [found[stamp_ns] for stamp_ns in sorted(found)]
+    poses = pose is not None or robot == frames[1] or ends_at(steps) != frames[1]
+    return [found[stamp_ns] for stamp_ns in sorted(found)], poses
+
+
+def _said(now: Stamped | None) -> StampedPose | None:
+    return None if now is None else StampedPose(now.stamp_ns, now.pose)
+
+
+def is_odometry(
+    path: Path, frames: tuple[str, str], driven: Iterable[Odometry], shift_ns: int
+) -> bool:
+    """Whether transforms from odometry to the robot in a bag are what was ``driven``, or missing.
+
+    A stack may have a frame of odometry of its own, whatever its name.
+
+    shift_ns  what the stamps of the bag have more
+    """
+    with Bag(path) as bag:
+        topics = [name for name in _TF if bag.topics.get(name, ("", 0))[0] in TRANSFORMS]
+        steps = way(_links(bag, topics), *frames)
+        if not steps:
+            return True
+        chain, track = Chain(steps), PoseTrack()
+        for topic, log_ns, message in bag.messages(topics):
+            with suppress(InvalidValueError):  # told where the statements are read
+                if (now := chain.newest(topic, message, log_ns)) is not None:
+                    track.add(now)
+    apart = [
+        math.dist(now.pose[:2], one.T_odom_robot[:2])
+        for one in driven
+        if (now := track.at(one.stamp_ns + shift_ns)) is not None
+    ]
+    return not apart or float(np.median(apart)) < ANOTHER_M
+
+
+def _steps(bag: Bag, topics: list[str], frames: tuple[str, str], robot: str) -> list[Step]:
+    """The way from the map to odometry, else to the robot; [] without one."""
+    links = _links(bag, topics)
+    goals = (frames[1], robot, *bases(links, robot))
+    return next(filter(None, (way(links, frames[0], goal, fixed=True) for goal in goals)), [])
+
+
+def _links(bag: Bag, topics: list[str]) -> dict[Edge, Any]:
+    links: dict[Edge, Any] = {}
+    for _, _, message in bag.messages(topics):
+        links |= {edge_of(link): link.transform for link in message.transforms}
+        if len(links) > MOST_TRANSFORMS:
+            break
+    return links
 
 
 def aligned(

@@ -11,6 +11,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 
 from sim.moments import Moment
 from sim.recording.bag import VERSION, BagWriter
+from slam import se2
 from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
 from slam.ros.recorded import read_statements
 from slam.ros.template import EPOCH_NS, STORE
@@ -34,6 +35,43 @@ def written(path: Path, *, truth: bool) -> Path:
 def ours(tmp_path_factory) -> Path:
     """A bag with truth."""
     return written(tmp_path_factory.mktemp("ours") / "bag", truth=True)
+
+
+OWN = np.array([1.0, 2.0, 0.5])  # where a stack of its own odometry begins
+CHAINS = {  # links of /tf, from what is stated, as (map -> odom, odometry)
+    "map -> robot": lambda said, driven: {(MAP, "base_footprint"): se2.compose(said, driven)},
+    "its own frame": lambda said, driven: {
+        (MAP, "local"): OWN,
+        ("local", "base_footprint"): se2.between(OWN, se2.compose(said, driven)),
+    },
+    "its own, of the same name": lambda said, driven: {
+        (MAP, ODOM): OWN,
+        (ODOM, "base_footprint"): se2.between(OWN, se2.compose(said, driven)),
+    },
+    "upside down": lambda said, driven: {(ODOM, MAP): se2.inverse(said)},
+    "in two parts": lambda said, driven: {(MAP, "mid"): OWN, ("mid", ODOM): se2.between(OWN, said)},
+    "as it should be": lambda said, driven: {
+        (MAP, ODOM): said, (ODOM, "base_footprint"): driven
+    },
+}  # fmt: skip
+
+
+@pytest.mark.parametrize("name", CHAINS)
+def test_whatever_way_leads_to_the_robot_is_followed(called, ours, tmp_path, name):
+    edges = list(CHAINS[name](OWN, OWN))
+    says = [TransformMessage((*edge, 0.0)) for edge in edges]
+    with Writer(tmp_path / "said", version=VERSION, storage_plugin=StoragePlugin.MCAP) as bag:
+        connection = bag.add_connection("/tf", says[0].KIND, typestore=STORE)
+        for k, frame in enumerate(FRAMES):
+            off = np.array([0.001 * k, 0.0, 0.0])
+            poses = CHAINS[name](off, frame.odometry.T_odom_robot)
+            for say, edge in zip(says, edges, strict=True):
+                data = bytes(say(frame.stamp_ns, poses[edge]))
+                bag.write(connection, frame.stamp_ns + EPOCH_NS, data)
+    ended = called("score", tmp_path / "said", "--on", ours, "--out", tmp_path / "out")
+    assert ended.returncode == 0, ended.stdout + ended.stderr
+    slams = json.loads((tmp_path / "out" / "results.json").read_text())["slams"]
+    assert slams["recorded"]["end_error_m"] == pytest.approx(0.059, abs=1e-3)
 
 
 def stack(path: Path, offset_ns: int = 0) -> Path:
@@ -76,7 +114,8 @@ def test_poses_that_cannot_be_are_left_out_and_told_once(ours, tmp_path, caplog)
         for k, frame in enumerate(FRAMES):
             data = bytes(say(frame.stamp_ns, np.zeros(3), -spread if k % 3 == 0 else spread))
             bag.write(connection, frame.stamp_ns + EPOCH_NS, data)
-    found = read_statements(tmp_path / "b", pose="/amcl_pose")
+    found, poses = read_statements(tmp_path / "b", pose="/amcl_pose")
+    assert poses
     assert len(found) == 40
     assert "left out of what was said: 20 messages, the first: " in caplog.text
     assert "topic /amcl_pose, message 1: pose.covariance must be symmetric" in caplog.text
@@ -95,6 +134,7 @@ def test_without_truth_what_can_be_said_is_said(called, tmp_path):
     [
         (lambda said: ("--pose", "/amcl_pose"), "no pose on /amcl_pose"),
         (lambda said: ("--map-frame", "world"), "no world -> odom on /tf; topics: /tf"),
+        (lambda said: ("--odom-frame", "local"), "is in the frame 'odom', got 'local'"),
         (lambda said: ("--clock-offset", "nan"), "--clock-offset must be a number from"),
         (lambda said: torn(said), "said: corrupt or truncated bag"),
         (lambda said: ("--on", said), "said: no message of type sensor_msgs/msg/LaserScan"),
