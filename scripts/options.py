@@ -90,9 +90,15 @@ class Recorded:
     text_format: Path | None = option(
         "TOML file that says which columns of a text log hold what.", None, "--format"
     )
-    laser: str | None = option(
+    scan: list[str] | None = option(
+        "Topic of a bag's scans; repeated, several scanners of one robot, of which SLAMs that take "
+        "one get the first. Default the likeliest.",
+        None,
+        metavar="TOPIC",
+    )
+    laser: list[str] | None = option(
         "Where a log's scanner is on the robot, m, m and degrees: --laser 0.1,0,180 looks "
-        "backwards. Default as the log says.",
+        "backwards. Default as the log says. With several --scan, once for each.",
         None,
         metavar="X,Y,YAW_DEG",
     )

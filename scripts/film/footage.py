@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be filmed: a run's folder, a dataset's episode, a log, or a simulation at hand."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -30,6 +31,7 @@ from slam.logs import open_log
 from slam.logs.bag import read_bag
 from slam.logs.bag_topics import is_bag
 from slam.logs.mounting import MountingTest, remounted
+from slam.logs.together import together
 from slam.oracle import Oracle
 from slam.replay import Replay, systems_named
 
@@ -46,7 +48,7 @@ class Footage:
     slam     the SLAM that the run was about, "" where nobody says
     made_with  what the simulation was made with, for a recipe
     scans    of a log, how many
-    tested   of a log, what says how its scanner is mounted
+    tested   of a log, what says how its scanners are mounted, by ``LaserSpec.mount``
     empty    of a log, share of its scans with next to no returns
     """
 
@@ -58,7 +60,7 @@ class Footage:
     slam: str = ""
     scans: int = 0
     empty: float = 0.0
-    tested: MountingTest | None = None
+    tested: Mapping[tuple[float, ...], MountingTest] = field(default_factory=dict)
     made_with: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -177,24 +179,39 @@ def of_log(
     *,
     strict: bool = False,
     text_format: Path | None = None,
-    mount: Float | None = None,
+    scans: Sequence[str] = (),
+    mounts: Sequence[Float] = (),
     flip: bool = False,
 ) -> Footage:
     """A log: its scans are all that is known of the world. Options as of ``open_log``.
 
-    mount  (3,) T_robot_laser in place of the log's; ``flip``: its beams count the other way round
+    scans   topics of a bag's scanners; none: the likeliest
+    mounts  (3,) T_robot_laser of each, in place of the log's; ``flip``: its beams count the other
+            way round
     """
     check_bag(path)
-    if text_format is None and is_bag(path):
-        stream = read_bag(path, labels=True, strict=strict)
-    else:
-        stream = open_log(path, strict=strict, text_format=text_format)
-    if mount is not None or flip:
-        by = " and ".join(w for w, on in (("--laser", mount is not None), ("--flip", flip)) if on)
-        stream = remounted(stream, mount, flip=flip, by=by)
-    labelled, stamps_ns, empty, tested = False, list[int](), 0, MountingTest()
+    bag = text_format is None and is_bag(path)
+    if scans and not bag:
+        raise InvalidValueError(f"--scan names topics of a bag, and {path} is none")
+    if mounts and len(mounts) != max(1, len(scans)):
+        raise InvalidValueError("--laser is given once, or with several --scan once for each")
+    if flip and len(scans) > 1:
+        raise InvalidValueError("--flip is about one scanner, and --scan names several")
+    streams = (
+        [read_bag(path, scan=scan, labels=True, strict=strict) for scan in scans or (None,)]
+        if bag
+        else [open_log(path, strict=strict, text_format=text_format)]
+    )
+    if mounts or flip:
+        by = " and ".join(word for word, on in (("--laser", mounts), ("--flip", flip)) if on)
+        each = zip(streams, mounts or (None,), strict=True)
+        streams = [remounted(stream, mount, flip=flip, by=by) for stream, mount in each]
+    stream = together(streams)
+    labelled, stamps_ns, empty = False, list[int](), 0
+    tested = defaultdict[tuple[float, ...], MountingTest](MountingTest)
     for frame in stream:
-        tested.note(frame)
+        if frame.scan is not None:
+            tested[frame.scan.spec.mount].note(frame)
         empty += frame.scan is not None and float(frame.scan.valid.mean()) < FEW_RETURNS
         stamps_ns.append(frame.stamp_ns)
         labelled = labelled or frame.labels is not None

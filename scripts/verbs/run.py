@@ -63,7 +63,9 @@ class Run:
 
     def _on_scene(self, slams: list[str], scene: str) -> None:
         if self.recorded != Recorded():
-            raise InvalidValueError("--strict, --format, --laser and --flip are about a --log")
+            raise InvalidValueError(
+                "--strict, --format, --scan, --laser and --flip are about a --log"
+            )
         if self.map_in or self.map_out or self.at:
             raise InvalidValueError("--map-in, --map-out and --at are about a --log")
         from scripts.single_run.run import on_scene

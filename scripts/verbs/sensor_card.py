@@ -30,7 +30,7 @@ class SensorCard:
     log: list[Path] | None = option(
         "A real log to set it beside; several are taken for one scanner's."
     )
-    recorded: Recorded = part(Recorded, without=("laser", "flip"))
+    recorded: Recorded = part(Recorded, without=("scan", "laser", "flip"))
 
     def __call__(self) -> None:
         if self.out is not None:

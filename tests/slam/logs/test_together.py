@@ -1,0 +1,146 @@
+# SPDX-License-Identifier: Apache-2.0
+"""Several scanners of one bag as one stream, and what a run says of it."""
+
+import logging
+import math
+from dataclasses import replace
+from itertools import pairwise
+from pathlib import Path
+from typing import Any
+
+import numpy as np
+import pytest
+
+import tests.slam.logs.foreign_bags as bags
+from scripts.film.footage import of_log
+from scripts.single_run import run
+from slam import create, se2
+from slam.errors import InvalidValueError
+from slam.frames import Frame, Stream, StreamMetadata
+from slam.logs import read_bag
+from slam.logs.together import together
+from tests.world2d import Drive, World2D, arena, frames, laser
+
+MS, TURNED = 1_000_000, (0.0, 0.0, 1.0, 0.0)
+MOUNTS = {"front": (0.3, 0.0, 0.0), "rear": (-0.3, 0.0, math.pi)}
+WAY = Drive((0.0, 0.0, 0.0), ((0.4, 0.4, 8.0), (0.4, -0.4, 8.0)))
+
+
+def bag(path: Path, *, apart_s: float = 0.05, late_ns: int = 0, transforms: bool = True) -> Path:
+    """A drive with a scanner ahead and one behind; that one's messages are logged late."""
+    make, first = bags.Maker(), bags.START_NS
+    out = []
+    if transforms:
+        for name, (x, y, yaw) in MOUNTS.items():
+            flat = TURNED if yaw else (0.0, 0.0, 0.0, 1.0)
+            out.append(make.transform(first, "base_link", name, (x, y, 0.0), flat))
+    specs = [
+        replace(laser(n), T_robot_laser=np.array(mount))
+        for n, mount in zip((91, 61), MOUNTS.values(), strict=True)
+    ]
+    driven = frames(World2D(arena()), WAY, rate_hz=5.0, spec=specs, apart_s=apart_s, seed=4)
+    for k, frame in enumerate(driven):
+        name, stamp = ("front", "rear")[k % 2], first + frame.stamp_ns
+        if k == 0 or frame.stamp_ns > driven[k - 1].stamp_ns:
+            out.append(make.odometry(stamp, frame.odometry.T_odom_robot))
+        spec = frame.scan.spec
+        topic, kind, _, message = make.scan(
+            stamp, frame.scan.ranges, topic=f"/{name}", header=make.header(stamp, name),
+            angle_min=spec.angle_min, angle_increment=spec.angle_increment,
+        )  # fmt: skip
+        out.append((topic, kind, stamp + late_ns * (k % 2), message))
+    return bags.write_ros2(path, sorted(out, key=lambda one: one[2]), "mcap")
+
+
+def read(path: Path) -> list[Frame]:
+    return list(together([read_bag(path, scan=topic) for topic in ("/front", "/rear")]))
+
+
+@pytest.mark.parametrize("apart_s", [0.05, 0.0])
+@pytest.mark.parametrize("late_ns", [0, 333 * MS])
+def test_frames_come_in_the_order_of_their_stamps_however_they_were_logged(
+    tmp_path: Path, apart_s: float, late_ns: int
+) -> None:
+    path = bag(tmp_path / "two", apart_s=apart_s, late_ns=late_ns)
+    merged, front = read(path), list(read_bag(path, scan="/front"))
+    stamps = [frame.stamp_ns for frame in merged]
+    assert stamps == sorted(set(stamps))
+    own = [frame for frame in merged if frame.scan.spec.mount == MOUNTS["front"]]
+    assert own[0] == merged[0] == front[0]
+    assert len(merged) == 2 * len(own) == 2 * len(front)
+    assert [frame.scan.ranges.tolist() for frame in own] == [f.scan.ranges.tolist() for f in front]
+    if apart_s == 0.0:
+        assert np.diff(stamps).tolist()[::2] == [1] * len(front)
+    for before, frame in pairwise(merged):
+        assert frame.scan.stamp_ns == frame.odometry.stamp_ns == frame.stamp_ns
+        step = se2.between(before.odometry.T_odom_robot, frame.odometry.T_odom_robot)
+        assert math.hypot(step[0], step[1]) < 0.1
+
+
+def test_a_covariance_of_odometry_is_that_of_the_step_between_frames() -> None:
+    made = frames(World2D(arena()), WAY, rate_hz=5.0, spec=laser(9), seed=1)
+
+    def of(part: list[Frame], x: float) -> Stream:
+        spec = replace(laser(9), T_robot_laser=np.array([x, 0.0, 0.0]))
+        out = [replace(f, scan=replace(f.scan, spec=spec)) for f in part]
+        return Stream(
+            metadata=StreamMetadata(source="test", laser=spec, mounting="known"),
+            frames=lambda: out, length=len(out),
+        )  # fmt: skip
+
+    known = np.diag([4e-4, 4e-4, 1e-4])
+    steady = [replace(f, odometry=replace(f.odometry, increment_covariance=known)) for f in made]
+    both = together([of(steady[::2], 0.0), of(steady[1::2], 0.3)])
+    merged = list(both)
+    assert both.length == len(merged) == len(made)
+    for frame in merged[2:]:  # each had that of two steps
+        np.testing.assert_allclose(frame.odometry.increment_covariance, known / 2.0)
+
+
+def test_a_run_says_where_both_are_and_tests_each(
+    tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
+) -> None:
+    path, topics = bag(tmp_path / "two"), ("/front", "/rear")
+    run.tell(of_log(path, scans=topics), strict=True)
+    line = capsys.readouterr().out
+    assert "rosbag2, /front; 91 beams" in line
+    assert "/rear, 61 beams over 180° (counter-clockwise), up to 30 m, scanner at x -0.3" in line
+    assert "turned 180° on the robot, by base_link -> rear of /tf_static" in line
+    assert not caplog.text
+    ahead = [run.mount_of(text) for text in ("0.3,0,0", "-0.3,0,0")]
+    with caplog.at_level(logging.WARNING):
+        found = run.tell(of_log(path, scans=topics, mounts=ahead), strict=False)
+    assert "two, /rear: Scans contradict odometry" in caplog.text
+    assert "agree under --laser -0.3,0,180 (" in caplog.text
+    assert found[0].turned_deg == 180
+
+
+def test_what_cannot_be_is_refused_with_the_cure(tmp_path: Path) -> None:
+    topics, ahead = ("/front", "/rear"), np.zeros(3)
+    unsaid = bag(tmp_path / "unsaid", transforms=False)
+    with pytest.raises(InvalidValueError, match="unsaid: nothing says how the scanner of /fr"):
+        of_log(unsaid, scans=topics)
+    for wrong, options in {
+        "once for each": {"scans": topics, "mounts": [ahead]},
+        "--flip is about one scanner": {"scans": topics, "flip": True},
+    }.items():
+        with pytest.raises(InvalidValueError, match=wrong):
+            of_log(unsaid, **options)
+    text = tmp_path / "a.log"
+    text.write_text("")
+    with pytest.raises(InvalidValueError, match="--scan names topics of a bag"):
+        of_log(text, scans=topics)
+
+
+def test_shunting_knows_the_room_by_both_and_better_than_by_the_rear_alone(tmp_path: Path) -> None:
+    path = bag(tmp_path / "two")
+    poses: list[Any] = []
+    for stream in (read(path), list(read_bag(path, scan="/rear"))):
+        slam = create("shunting")
+        estimates = [slam.update(frame) for frame in stream]
+        assert all(estimate.converged for estimate in estimates)
+        t = (stream[-1].stamp_ns - bags.START_NS) * 1e-9
+        start = WAY.at((stream[0].stamp_ns - bags.START_NS) * 1e-9)[0]
+        off = se2.between(start, WAY.at(t)[0]) - estimates[-1].T_map_robot
+        poses.append(math.hypot(off[0], off[1]))
+    assert max(poses) < 0.02
