@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Several scanners of one bag as one stream, and what a run says of it."""
+"""Several scanners of one bag as one stream."""
 
-import logging
 import math
 from dataclasses import replace
 from itertools import pairwise
@@ -12,44 +11,14 @@ import numpy as np
 import pytest
 
 import tests.slam.logs.foreign_bags as bags
-from scripts.film.footage import of_log
-from scripts.single_run import run
 from slam import create, se2
-from slam.errors import InvalidValueError
 from slam.frames import Frame, Stream, StreamMetadata
 from slam.logs import read_bag
 from slam.logs.together import together
-from tests.world2d import Drive, World2D, arena, frames, laser
+from tests.slam.logs.two_scanners import MOUNTS, WAY, bag
+from tests.world2d import World2D, arena, frames, laser
 
-MS, TURNED = 1_000_000, (0.0, 0.0, 1.0, 0.0)
-MOUNTS = {"front": (0.3, 0.0, 0.0), "rear": (-0.3, 0.0, math.pi)}
-WAY = Drive((0.0, 0.0, 0.0), ((0.4, 0.4, 8.0), (0.4, -0.4, 8.0)))
-
-
-def bag(path: Path, *, apart_s: float = 0.05, late_ns: int = 0, transforms: bool = True) -> Path:
-    """A drive with a scanner ahead and one behind; that one's messages are logged late."""
-    make, first = bags.Maker(), bags.START_NS
-    out = []
-    if transforms:
-        for name, (x, y, yaw) in MOUNTS.items():
-            flat = TURNED if yaw else (0.0, 0.0, 0.0, 1.0)
-            out.append(make.transform(first, "base_link", name, (x, y, 0.0), flat))
-    specs = [
-        replace(laser(n), T_robot_laser=np.array(mount))
-        for n, mount in zip((91, 61), MOUNTS.values(), strict=True)
-    ]
-    driven = frames(World2D(arena()), WAY, rate_hz=5.0, spec=specs, apart_s=apart_s, seed=4)
-    for k, frame in enumerate(driven):
-        name, stamp = ("front", "rear")[k % 2], first + frame.stamp_ns
-        if k == 0 or frame.stamp_ns > driven[k - 1].stamp_ns:
-            out.append(make.odometry(stamp, frame.odometry.T_odom_robot))
-        spec = frame.scan.spec
-        topic, kind, _, message = make.scan(
-            stamp, frame.scan.ranges, topic=f"/{name}", header=make.header(stamp, name),
-            angle_min=spec.angle_min, angle_increment=spec.angle_increment,
-        )  # fmt: skip
-        out.append((topic, kind, stamp + late_ns * (k % 2), message))
-    return bags.write_ros2(path, sorted(out, key=lambda one: one[2]), "mcap")
+MS = 1_000_000
 
 
 def read(path: Path) -> list[Frame]:
@@ -95,41 +64,6 @@ def test_a_covariance_of_odometry_is_that_of_the_step_between_frames() -> None:
     assert both.length == len(merged) == len(made)
     for frame in merged[2:]:  # each had that of two steps
         np.testing.assert_allclose(frame.odometry.increment_covariance, known / 2.0)
-
-
-def test_a_run_says_where_both_are_and_tests_each(
-    tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
-) -> None:
-    path, topics = bag(tmp_path / "two"), ("/front", "/rear")
-    run.tell(of_log(path, scans=topics), strict=True)
-    line = capsys.readouterr().out
-    assert "rosbag2, /front; 91 beams" in line
-    assert "/rear, 61 beams over 180° (counter-clockwise), up to 30 m, scanner at x -0.3" in line
-    assert "turned 180° on the robot, by base_link -> rear of /tf_static" in line
-    assert not caplog.text
-    ahead = [run.mount_of(text) for text in ("0.3,0,0", "-0.3,0,0")]
-    with caplog.at_level(logging.WARNING):
-        found = run.tell(of_log(path, scans=topics, mounts=ahead), strict=False)
-    assert "two, /rear: Scans contradict odometry" in caplog.text
-    assert "agree under --laser -0.3,0,180 (" in caplog.text
-    assert found[0].turned_deg == 180
-
-
-def test_what_cannot_be_is_refused_with_the_cure(tmp_path: Path) -> None:
-    topics, ahead = ("/front", "/rear"), np.zeros(3)
-    unsaid = bag(tmp_path / "unsaid", transforms=False)
-    with pytest.raises(InvalidValueError, match="unsaid: nothing says how the scanner of /fr"):
-        of_log(unsaid, scans=topics)
-    for wrong, options in {
-        "once for each": {"scans": topics, "mounts": [ahead]},
-        "--flip is about one scanner": {"scans": topics, "flip": True},
-    }.items():
-        with pytest.raises(InvalidValueError, match=wrong):
-            of_log(unsaid, **options)
-    text = tmp_path / "a.log"
-    text.write_text("")
-    with pytest.raises(InvalidValueError, match="--scan names topics of a bag"):
-        of_log(text, scans=topics)
 
 
 def test_shunting_knows_the_room_by_both_and_better_than_by_the_rear_alone(tmp_path: Path) -> None:
