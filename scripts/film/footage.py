@@ -204,8 +204,10 @@ def of_log(
     )
     if mounts or flip:
         by = " and ".join(word for word, on in (("--laser", mounts), ("--flip", flip)) if on)
-        each = zip(streams, mounts or (None,), strict=True)
-        streams = [remounted(stream, mount, flip=flip, by=by) for stream, mount in each]
+        streams = [
+            remounted(stream, mounts[k] if mounts else None, flip=flip, by=by)
+            for k, stream in enumerate(streams)
+        ]
     stream = together(streams)
     labelled, stamps_ns, empty = False, list[int](), 0
     tested = defaultdict[tuple[float, ...], MountingTest](MountingTest)
