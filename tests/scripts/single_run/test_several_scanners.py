@@ -8,7 +8,7 @@ import numpy as np
 import pytest
 
 from scripts.film.footage import of_log
-from scripts.single_run import run
+from scripts.single_run import log_words
 from slam.errors import InvalidValueError
 from tests.slam.logs.two_scanners import bag
 
@@ -17,15 +17,15 @@ def test_a_run_says_where_both_are_and_tests_each(
     tmp_path: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
     path, topics = bag(tmp_path / "two"), ("/front", "/rear")
-    run.tell(of_log(path, scans=topics), strict=True)
+    log_words.tell(of_log(path, scans=topics), strict=True)
     line = capsys.readouterr().out
     assert "rosbag2, /front; 91 beams" in line
     assert "/rear, 61 beams over 180° (counter-clockwise), up to 30 m, scanner at x -0.3" in line
     assert "turned 180° on the robot, by base_link -> rear of /tf_static" in line
     assert not caplog.text
-    ahead = [run.mount_of(text) for text in ("0.3,0,0", "-0.3,0,0")]
+    ahead = [log_words.mount_of(text) for text in ("0.3,0,0", "-0.3,0,0")]
     with caplog.at_level(logging.WARNING):
-        found = run.tell(of_log(path, scans=topics, mounts=ahead), strict=False)
+        found = log_words.tell(of_log(path, scans=topics, mounts=ahead), strict=False)
     assert "two, /rear: Scans contradict odometry" in caplog.text
     assert "agree under --laser -0.3,0,180 (" in caplog.text
     assert found[0].turned_deg == 180
