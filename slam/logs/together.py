@@ -20,25 +20,25 @@ def together(streams: Sequence[Stream]) -> Stream:
     mounted anywhere: their scans would contradict each other.
     """
     first, *others = (stream.metadata for stream in streams)
-    for one in (first, *others) if others else ():
+    if not others:
+        return streams[0]
+    for one in (first, *others):
         if not one.mounting:
             raise InvalidValueError(
                 f"{one.extra.get('file')}: nothing says how the scanner of {one.extra.get('scan')} "
                 "is mounted, and there are several: give --laser x,y,yaw_deg once for each --scan, "
                 "in their order"
             )
-    if not others:
-        return streams[0]
+    measured = all(one.odometry for one in (first, *others))
     lengths = [stream.length for stream in streams]
     return Stream(
-        metadata=replace(first, others=tuple(others)),
-        frames=lambda: _merged(streams),
+        metadata=replace(first, others=tuple(others), odometry=measured),
+        frames=lambda: _merged(streams, measured),
         length=None if None in lengths else sum(length or 0 for length in lengths),
     )
 
 
-def _merged(streams: Sequence[Stream]) -> Iterator[Frame]:
-    measured = streams[0].metadata.odometry
+def _merged(streams: Sequence[Stream], measured: bool) -> Iterator[Frame]:
     before: Frame | None = None
     own_ns: dict[int, int] = {}  # the stamp before, by stream
     numbered = (zip(stream, repeat(k)) for k, stream in enumerate(streams))
@@ -53,6 +53,7 @@ def _merged(streams: Sequence[Stream]) -> Iterator[Frame]:
 def _after(before: Frame, frame: Frame, since_ns: int | None, measured: bool) -> Frame:
     """The frame with a stamp and a covariance of odometry that follow those of ``before``.
 
+    measured  whether there is odometry
     since_ns  the stamp that its covariance begins at, which grows with time
     """
     stamp_ns, odometry, scan = max(frame.stamp_ns, before.stamp_ns + 1), frame.odometry, frame.scan

@@ -46,16 +46,19 @@ def test_frames_come_in_the_order_of_their_stamps_however_they_were_logged(
         assert math.hypot(step[0], step[1]) < 0.1
 
 
+def of(part: list[Frame], x: float, *, odometry: bool = True) -> Stream:
+    spec = replace(laser(9), T_robot_laser=np.array([x, 0.0, 0.0]))
+    out = [replace(f, scan=replace(f.scan, spec=spec)) for f in part]
+    return Stream(
+        metadata=StreamMetadata(
+            source="test", laser=spec, mounting="known", odometry=odometry
+        ),
+        frames=lambda: out, length=len(out),
+    )  # fmt: skip
+
+
 def test_a_covariance_of_odometry_is_that_of_the_step_between_frames() -> None:
     made = frames(World2D(arena()), WAY, rate_hz=5.0, spec=laser(9), seed=1)
-
-    def of(part: list[Frame], x: float) -> Stream:
-        spec = replace(laser(9), T_robot_laser=np.array([x, 0.0, 0.0]))
-        out = [replace(f, scan=replace(f.scan, spec=spec)) for f in part]
-        return Stream(
-            metadata=StreamMetadata(source="test", laser=spec, mounting="known"),
-            frames=lambda: out, length=len(out),
-        )  # fmt: skip
 
     known = np.diag([4e-4, 4e-4, 1e-4])
     steady = [replace(f, odometry=replace(f.odometry, increment_covariance=known)) for f in made]
@@ -78,3 +81,11 @@ def test_shunting_knows_the_room_by_both_and_better_than_by_the_rear_alone(tmp_p
         off = se2.between(start, WAY.at(t)[0]) - estimates[-1].T_map_robot
         poses.append(math.hypot(off[0], off[1]))
     assert max(poses) < 0.02
+
+
+def test_odometry_that_one_of_them_has_not_is_none() -> None:
+    """A reader finds that it stands still by the scans of one: the two may not be mixed."""
+    made = frames(World2D(arena()), WAY, rate_hz=5.0, spec=laser(9), seed=1)
+    both = together([of(made[::2], 0.0), of(made[1::2], 0.3, odometry=False)])
+    assert not both.metadata.odometry
+    assert not any(frame.odometry.T_odom_robot.any() for frame in list(both)[1:])
