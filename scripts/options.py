@@ -90,18 +90,20 @@ class Recorded:
     text_format: Path | None = option(
         "TOML file that says which columns of a text log hold what.", None, "--format"
     )
-    scan: str | None = option(
-        "Topic of a bag's scans, /rear/scan; /scan:FRAME where several scanners share it. Default "
-        "the likeliest, which the first line names.",
+    scan: list[str] | None = option(
+        "Topic of a bag's scans, /rear/scan; /scan:FRAME where several scanners share it. "
+        "Repeated, several of one robot: SLAMs that take one get the first. Default the "
+        "likeliest, which the first line names.",
+        None,
         metavar="TOPIC",
     )
     odometry: str | None = option(
         "Topic of a bag's odometry, /wheel/odom; /tf:FRAME for the transforms below that frame.",
         metavar="TOPIC",
     )
-    laser: str | None = option(
+    laser: list[str] | None = option(
         "Where a log's scanner is on the robot, m, m and degrees: --laser 0.1,0,180 looks "
-        "backwards. Default as the log says.",
+        "backwards. Default as the log says. With several --scan, once for each.",
         None,
         metavar="X,Y,YAW_DEG",
     )

@@ -46,18 +46,27 @@ class ConstantVelocity:
     def __init__(self) -> None:
         self._T_odom_robot: Float = np.zeros(3)
         self._before_ns: int | None = None
+        self._frames, self._back = 0, 1  # so many frames ago the last one's scanner looked before
+        self._looked: dict[tuple[float, ...], int] = {}
 
     def frame(self, frame: Frame, estimates: Sequence[Estimate]) -> Frame:
-        """``frame`` with odometry that goes on as ``estimates``, those so far, moved last."""
+        """``frame`` with odometry that goes on as ``estimates``, those so far, moved last.
+
+        Between two scans of one scanner: what two say may differ, and they may be moments apart.
+        """
         stamp_ns, before_ns = frame.stamp_ns, self._before_ns
         self._before_ns = stamp_ns
         spread, velocity = None, np.zeros(3)
         if before_ns is not None:
             elapsed_s = (stamp_ns - before_ns) / NS_PER_S
-            found = _velocity(estimates) if elapsed_s <= LONGEST_S else None
+            found = _velocity(estimates, self._back) if elapsed_s <= LONGEST_S else None
             velocity = np.zeros(3) if found is None else found
             self._T_odom_robot = se2.compose(self._T_odom_robot, se2.exp(velocity, elapsed_s))
             spread = _covariance(elapsed_s, known=found is not None)
+        if frame.scan is not None:
+            self._back = self._frames - self._looked.get(frame.scan.spec.mount, self._frames - 1)
+            self._looked[frame.scan.spec.mount] = self._frames
+        self._frames += 1
         odometry = Odometry(
             stamp_ns=stamp_ns,
             T_odom_robot=self._T_odom_robot,
@@ -74,11 +83,11 @@ class ConstantVelocity:
         )
 
 
-def _velocity(estimates: Sequence[Estimate]) -> Float | None:
-    """(3,) m/s, m/s, rad/s between the last two; None where they do not say."""
-    if len(estimates) < 2 or not estimates[-1].converged:
+def _velocity(estimates: Sequence[Estimate], back: int) -> Float | None:
+    """(3,) m/s, m/s, rad/s over the last ``back``; None where they do not say."""
+    if len(estimates) <= back or not estimates[-1].converged:
         return None
-    a, b = estimates[-2:]
+    a, b = estimates[-1 - back], estimates[-1]
     elapsed_s = (b.stamp_ns - a.stamp_ns) / NS_PER_S
     if not 0.0 < elapsed_s <= LONGEST_S:
         return None

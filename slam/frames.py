@@ -57,6 +57,8 @@ def to_s(nanoseconds: int) -> float:
 class LaserSpec(ByContent):
     """Geometry and timing of a planar scanner; one object shared by all its scans.
 
+    A robot may have several: each scan of a stream is as its own says (``mount``).
+
     n_beams            number of beams, counted counter-clockwise (right to left), up to 10^6
     angle_min          rad, direction of beam 0 in the laser frame, within two turns
     angle_increment    rad between neighbouring beams, at least 1e-5
@@ -108,6 +110,11 @@ class LaserSpec(ByContent):
         offsets = self._offsets()
         set_fields(self, beam_time_offsets=offsets, sweep_duration=float(offsets.max()))
         set_fields(self, T_robot_laser=mounted, angles=angles)
+
+    @property
+    def mount(self) -> tuple[float, ...]:
+        """``T_robot_laser`` as numbers: it tells the scanners of a robot apart."""
+        return tuple(self.T_robot_laser.tolist())
 
     def _check_angles(self) -> None:
         if not is_whole(self.n_beams) or not 1 <= self.n_beams <= MOST_BEAMS:
@@ -357,6 +364,7 @@ class StreamMetadata:
     mounting  where ``laser.T_robot_laser`` comes from, in words; "" where it is assumed
     odometry  False where nobody measured it: ``Frame.odometry`` stands still, and ``Replay`` gives
             each SLAM that of a constant velocity
+    others  of the robot's further scanners, whose scans are among the frames
     extra   JSON-serialisable facts (path, counts of repaired lines, ...); ``EPOCH`` among them is
             what the stamps of the recording are more than those of the frames, ns
     """
@@ -369,6 +377,7 @@ class StreamMetadata:
     truth: str = ""
     mounting: str = ""
     odometry: bool = True
+    others: tuple["StreamMetadata", ...] = ()
     extra: Mapping[str, Any] = field(default_factory=dict)
 
 

@@ -7,7 +7,8 @@
         def map(self) -> Raster | None: ...
         def trajectory(self) -> Trajectory: ...
 
-``HasLandmarks``, ``HasChanges``, ``CanSave``, ``SaysCells`` and ``RunsAtTheEnd`` are optional.
+``HasLandmarks``, ``HasChanges``, ``CanSave``, ``SaysCells``, ``TakesSeveral`` and ``RunsAtTheEnd``
+are optional.
 Who wants one of these asks whether it is there (``slam.replay.Track``), never for a class.
 """
 
@@ -81,6 +82,16 @@ class SaysCells(Protocol):
     """Optional: what the cells of ``map()`` hold, for titles: "probabilities", "activities"."""
 
     cells_hold: str
+
+
+@runtime_checkable
+class TakesSeveral(Protocol):
+    """Optional: True where scans of several scanners may come, told apart by ``LaserSpec.mount``.
+
+    Others get those of the first (``slam.one_scanner``).
+    """
+
+    takes_several: bool
 
 
 @runtime_checkable

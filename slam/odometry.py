@@ -17,6 +17,8 @@ class OdometrySlam(OnPath):
     carries none, stays zero with ``converged`` still True: the null system makes no claim.
     """
 
+    takes_several = True
+
     def __init__(self) -> None:
         self.reset()
 

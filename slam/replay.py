@@ -31,6 +31,7 @@ from slam.interface import (
     SlamSystem,
     told,
 )
+from slam.one_scanner import for_several
 from slam.oracle import shown
 from slam.system import create
 from slam.trajectory import Trajectory
@@ -205,8 +206,12 @@ class Replay:
     def run(self, frames: Iterable[Frame]) -> Iterator[Frame]:
         """Give each frame, stripped of truth, to every system; yield it back with its truth.
 
-        In a stream without odometry, each gets that of its own last motion.
+        In a stream without odometry, each gets that of its own last motion; in one of several
+        scanners, who cannot take them the scans of the first.
         """
+        if isinstance(frames, Stream) and frames.metadata.others:
+            for track in self.tracks.values():
+                track.system = for_several(track.system)
         measured = not isinstance(frames, Stream) or frames.metadata.odometry
         priors = {} if measured else {name: ConstantVelocity() for name in self.tracks}
         for frame in frames:

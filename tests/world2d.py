@@ -7,6 +7,7 @@ Small on purpose: it checks a SLAM against known motion, it does not judge fidel
 import math
 from collections.abc import Sequence
 from dataclasses import dataclass, replace
+from itertools import product
 from typing import Any
 
 import numpy as np
@@ -178,21 +179,27 @@ def frames(
     drive: Drive,
     *,
     rate_hz: float,
-    spec: LaserSpec | None = None,
+    spec: LaserSpec | Sequence[LaserSpec] | None = None,
+    apart_s: float = 0.0,
     wheels: Wheels | None = None,
     seed: int = 0,
     noise_m: float = 0.01,
     with_covariance: bool = True,
 ) -> list[Frame]:
-    """The drive as a robot would record it, truth attached."""
-    spec, wheels = spec or laser(), wheels or Wheels()
+    """The drive as a robot would record it, truth attached.
+
+    Of several scanners, each scans at that rate, ``apart_s`` after the one before it.
+    """
+    specs = [spec or laser()] if spec is None or isinstance(spec, LaserSpec) else spec
+    wheels = wheels or Wheels()
     rng = np.random.default_rng(seed)
     scale = 1.0 + rng.normal(0.0, wheels.scale_sd)
     difference = rng.normal(0.0, wheels.difference_sd)
     out: list[Frame] = []
     odom, before = np.zeros(3), drive.at(0.0)[0]
-    for k in range(math.floor(drive.duration * rate_hz) + 1):
-        t = k / rate_hz
+    scans = math.floor(drive.duration * rate_hz) + 1
+    for k, (which, spec) in product(range(scans), enumerate(specs)):
+        t = k / rate_hz + which * apart_s
         pose, twist = drive.at(t)
         increment, covariance = rolled(
             se2.log(se2.between(before, pose)), wheels, scale, difference, rng

@@ -24,7 +24,7 @@ def options() -> argparse.ArgumentParser:
     parser.add_argument("--slam", default="shunting")
     parser.add_argument("--config", type=json.loads, default={}, help="numbers by path, JSON")
     parser.add_argument("--laser", type=json.loads, help="[x m, y m, theta rad] on the robot")
-    parser.add_argument("--scan", help="topic of the scans of a bag")
+    parser.add_argument("--scan", nargs="+", help="topics of the scans of a bag")
     parser.add_argument("--every", type=int, default=1, help="take one scan of so many")
     parser.add_argument("--backwards", action="store_true", help="from the last scan to the first")
     return parser
@@ -36,7 +36,12 @@ def frames_of(given: argparse.Namespace) -> Any:
 
     from slam.logs import open_log, read_bag
 
-    stream = read_bag(given.log, scan=given.scan) if given.scan else open_log(given.log)
+    if given.scan and len(given.scan) > 1:
+        from slam.logs.together import together
+
+        stream = together([read_bag(given.log, scan=topic) for topic in given.scan])
+    else:
+        stream = read_bag(given.log, scan=given.scan[0]) if given.scan else open_log(given.log)
     specs: dict[int, Any] = {}  # one object for all scans, as a SLAM may keep tables of it
 
     def mounted(frame: Any) -> Any:

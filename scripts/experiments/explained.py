@@ -149,7 +149,7 @@ def searched(slam: ShuntingSlam, everyone: Observations) -> list[Float]:
 
 def frames_of(log: Log, file: Path, data: Path) -> list[Frame]:
     """The scans of a log from before or after the robot was carried, with a reference if any."""
-    words = [str(file), "", *(["--scan", log.scan] if log.scan else [])]
+    words = [str(file), "", *(["--scan", *log.scan] if log.scan else [])]
     words += ["--laser", json.dumps(log.laser)] if log.laser else []
     stream = along_log.frames_of(along_log.options().parse_args(words))
     frames = [frame for frame in stream if frame.scan is not None]

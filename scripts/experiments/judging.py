@@ -33,7 +33,7 @@ class Log:
     relations  file, and its clock less the log's, s; ``dense``: scans are near enough in time
     carried    the first scan after the robot was carried
     truth      TUM file of true poses; else the reference is what the log holds, if anything
-    laser      pose on the robot, where the log does not say it; ``scan``: topic, of several
+    laser      pose on the robot, where the log does not say it; ``scan``: topics, of several
     """
 
     file: str
@@ -42,7 +42,7 @@ class Log:
     carried: int | None = None
     truth: str | None = None
     laser: tuple[float, float, float] | None = None
-    scan: str | None = None
+    scan: tuple[str, ...] = ()
 
 
 @dataclass(frozen=True, kw_only=True)

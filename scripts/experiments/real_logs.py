@@ -52,8 +52,12 @@ LOGS: Mapping[str, Log] = {
     "jarvis-security": Log(file="jarvis_complex/security.mcap.xz", laser=(0.895, 0.0, 0.0),
                            truth="jarvis_complex/security_truth.tum"),
     "jarvis-navigation": Log(file="jarvis_complex/jarvis_complex_path_fast.bag",
-                             scan="/driver_laser_navigation/laser_scan", laser=(0.194, 0.0, 0.0),
+                             scan=("/driver_laser_navigation/laser_scan",), laser=(0.194, 0.0, 0.0),
                              truth="jarvis_complex/navigation_truth.tum"),
+    "jarvis-both": Log(file="jarvis_complex/jarvis_complex_path_fast.bag",
+                       scan=("/driver_laser_navigation/laser_scan",
+                             "/driver_laser_security/laser_scan"),
+                       truth="jarvis_complex/navigation_truth.tum"),
 }  # fmt: skip
 COLUMNS: Mapping[str, str] = {  # and how its numbers are written
     "log": "", "code": "", "slam": "", "scans": "d", "online_m": ".3f", "final_m": ".3f",
@@ -119,7 +123,7 @@ def cases(wanted: argparse.Namespace) -> list[tuple[Row, Job]]:
         file = unpacked(wanted.data / log.file, wanted.out / "unpacked")
         words = ["--slam", slam, "--config", json.dumps(wanted.config)]
         words += ["--laser", json.dumps(log.laser)] if log.laser else []
-        words += ["--scan", log.scan] if log.scan else []
+        words += ["--scan", *log.scan] if log.scan else []
         way = ""
         if wanted.every != 1:
             words, way = [*words, "--every", str(wanted.every)], f", every {wanted.every}"

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What can be filmed: a run's folder, a dataset's episode, a log, or a simulation at hand."""
 
+from collections import defaultdict
 from collections.abc import Callable, Iterator, Mapping, Sequence
 from dataclasses import dataclass, field, replace
 from pathlib import Path
@@ -32,6 +33,7 @@ from slam.logs import open_log
 from slam.logs.bag import read_bag
 from slam.logs.bag_topics import Asked, is_bag
 from slam.logs.mounting import MountingTest, remounted
+from slam.logs.together import together
 from slam.oracle import Oracle
 from slam.replay import Replay, systems_named
 
@@ -48,7 +50,7 @@ class Footage:
     slam     the SLAM that the run was about, "" where nobody says
     made_with  what the simulation was made with, for a recipe
     scans    of a log, how many
-    tested   of a log, what says how its scanner is mounted
+    tested   of a log, what says how its scanners are mounted, by ``LaserSpec.mount``
     empty    of a log, share of its scans with next to no returns
     usual_m  of a log, the median range
     """
@@ -62,7 +64,7 @@ class Footage:
     scans: int = 0
     empty: float = 0.0
     usual_m: float = 0.0
-    tested: MountingTest | None = None
+    tested: Mapping[tuple[float, ...], MountingTest] = field(default_factory=dict)
     made_with: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -181,30 +183,41 @@ def of_log(
     *,
     strict: bool = False,
     text_format: Path | None = None,
-    mount: Float | None = None,
+    asked: Sequence[Asked] = (Asked(),),
+    mounts: Sequence[Float] = (),
     flip: bool = False,
-    asked: Asked = Asked(),  # noqa: B008 (frozen)
 ) -> Footage:
     """A log: its scans are all that is known of the world. Options as of ``open_log``.
 
-    mount  (3,) T_robot_laser in place of the log's; ``flip``: its beams count the other way round
-    asked  topics of a bag; ``InvalidValueError`` for a log that is none
+    asked   topics of a bag, of each scanner
+    mounts  (3,) T_robot_laser of each, in place of the log's; ``flip``: its beams count the other
+            way round
     """
     check_bag(path)
-    if text_format is None and is_bag(path):
-        stream = read_bag(path, labels=True, strict=strict, **vars(asked))
-    elif asked != Asked():
+    bag = text_format is None and is_bag(path)
+    if not (bag or tuple(asked) == (Asked(),)):
         raise InvalidValueError(f"--scan and --odometry name topics, and {path} is no bag")
-    else:
-        stream = open_log(path, strict=strict, text_format=text_format)
-    if mount is not None or flip:
-        by = " and ".join(w for w, on in (("--laser", mount is not None), ("--flip", flip)) if on)
-        stream = remounted(stream, mount, flip=flip, by=by)
-    labelled, stamps_ns, empty, tested = False, list[int](), 0, MountingTest()
-    usual_m: list[float] = []
+    if mounts and len(mounts) != len(asked):
+        raise InvalidValueError("--laser is given once, or with several --scan once for each")
+    if flip and len(asked) > 1:
+        raise InvalidValueError("--flip is about one scanner, and --scan names several")
+    streams = (
+        [read_bag(path, labels=True, strict=strict, **vars(one)) for one in asked]
+        if bag
+        else [open_log(path, strict=strict, text_format=text_format)]
+    )
+    if mounts or flip:
+        by = " and ".join(word for word, on in (("--laser", mounts), ("--flip", flip)) if on)
+        streams = [
+            remounted(stream, mounts[k] if mounts else None, flip=flip, by=by)
+            for k, stream in enumerate(streams)
+        ]
+    stream = together(streams)
+    labelled, stamps_ns, empty, usual_m = False, list[int](), 0, list[float]()
+    tested = defaultdict[tuple[float, ...], MountingTest](MountingTest)
     for frame in stream:
-        tested.note(frame)
         if frame.scan is not None:
+            tested[frame.scan.spec.mount].note(frame)
             empty += float(frame.scan.valid.mean()) < FEW_RETURNS
             ranges = frame.scan.ranges[np.isfinite(frame.scan.ranges)]
             if len(ranges):

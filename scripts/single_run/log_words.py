@@ -29,10 +29,8 @@ class UntrustedRunError(MobiliaError):
     status = UNTRUSTED_STATUS
 
 
-def mount_of(text: str | None) -> Float | None:
-    """``--laser 0.1,0,180`` as (3,) m, m, rad; None for none."""
-    if text is None:
-        return None
+def mount_of(text: str) -> Float:
+    """``--laser 0.1,0,180`` as (3,) m, m, rad."""
     try:
         x, y, yaw_deg = (float(word) for word in text.replace(",", " ").split())
     except ValueError:
@@ -43,22 +41,33 @@ def mount_of(text: str | None) -> Float | None:
 def tell(footage: Footage, *, strict: bool) -> list[Mounting]:
     """Say what the log holds, and where its scanner is not known to be mounted as it was read.
 
-    Returns what ``MountingTest`` found. Raises ``InvalidValueError`` with ``strict`` where the
-    scans contradict the mounting.
+    Returns what ``MountingTest`` found of the scanner that its scans contradict, else of the first.
+    Raises ``InvalidValueError`` with ``strict`` where there is one.
     """
     metadata = footage.stream.metadata
     say(understood(footage), highlight=False)
     if words := units(footage):
         _log.warning("%s: %s", footage.title, words)
-    if metadata.laser is None or not metadata.odometry:
+    if not metadata.odometry:
         return []
-    found = footage.tested.told() if footage.tested else []
-    words = doubt(metadata, found)
-    if words and strict and found and not found[0].as_read and found[0].probability > SURE:
-        raise InvalidValueError(f"{footage.title}: {words} (refused by --strict)")
-    if words:
-        _log.warning("%s: %s", footage.title, words)
-    return found
+    told: list[Mounting] = []
+    for one in (metadata, *metadata.others):
+        if one.laser is None:
+            continue
+        found = footage.tested[one.laser.mount].told()
+        words, wrong = doubt(one, found), _elsewhere(found)
+        of = f"{footage.title}, {one.extra.get('scan')}" if metadata.others else footage.title
+        if words and strict and wrong:
+            raise InvalidValueError(f"{of}: {words} (refused by --strict)")
+        if words:
+            _log.warning("%s: %s", of, words)
+        told = found if wrong or not told else told
+    return told
+
+
+def _elsewhere(found: Sequence[Mounting]) -> bool:
+    """Whether scans agree under another mounting alone."""
+    return bool(found) and not found[0].as_read and found[0].probability > SURE
 
 
 def understood(footage: Footage) -> str:
@@ -70,23 +79,31 @@ def understood(footage: Footage) -> str:
     of = str(extra.get("scan") or extra.get("message") or "features")
     echoes = f" ({extra['echoes']})" if "echoes" in extra else ""
     parts = [f"{metadata.source}, {of}{echoes}"]
-    if laser := metadata.laser:
-        fov = math.degrees(laser.angles[-1] - laser.angles[0])
-        parts.append(
-            f"{laser.n_beams} beams over {fov:.0f}° "
-            f"({extra.get('turned', 'counter-clockwise')}), up to {laser.range_max:.3g} m"
-        )
-    parts.append(f"{count} scans at {rate:.3g} Hz")
-    if laser:
-        by = f"by {metadata.mounting}" if metadata.mounting else "assumed"
-        parts.append(f"scanner at {_place(laser.T_robot_laser)} on the robot, {by}")
+    beams, place = _scanner(metadata)
+    parts += [beams, f"{count} scans at {rate:.3g} Hz", place]
+    parts += [f"{one.extra.get('scan')}, {', '.join(_scanner(one))}" for one in metadata.others]
     if names := extra.get("ignored", {}).get(NAMES):
         parts.append(f"{names} {NAMES} passed over")
     odometry = str(extra.get("odometry") or "none")
     parts.append(f"odometry: {odometry if metadata.odometry else 'none'}")
-    if passed := extra.get("passed_over"):
+    named = {one.extra.get("scan") for one in metadata.others}
+    if passed := [name for name in extra.get("passed_over", ()) if name not in named]:
         parts.append(f"passed over (--scan, --odometry): {', '.join(passed)}")
-    return f"{footage.title}: {'; '.join(parts)}."
+    return f"{footage.title}: {'; '.join(filter(None, parts))}."
+
+
+def _scanner(metadata: StreamMetadata) -> tuple[str, str]:
+    """Its beams, and where it is on the robot; "" for a stream without one."""
+    laser = metadata.laser
+    if laser is None:
+        return "", ""
+    fov = math.degrees(laser.angles[-1] - laser.angles[0])
+    turned = metadata.extra.get("turned", "counter-clockwise")
+    by = f"by {metadata.mounting}" if metadata.mounting else "assumed"
+    return (
+        f"{laser.n_beams} beams over {fov:.0f}° ({turned}), up to {laser.range_max:.3g} m",
+        f"scanner at {_place(laser.T_robot_laser)} on the robot, {by}",
+    )
 
 
 def units(footage: Footage) -> str:
@@ -175,7 +192,7 @@ def distrust(track: Track, footage: Footage, found: Sequence[Mounting]) -> str:
     metadata = footage.stream.metadata
     stands = bool(metadata.extra.get(STANDS_STILL))
     causes += filter(None, ("its odometry stands still while scans move" * stands, units(footage)))
-    if found and not found[0].as_read and found[0].probability > SURE:
+    if _elsewhere(found):
         causes.append(f"the scanner is mounted otherwise: {flags(metadata, found[0])}")
     elif not found or found[0].probability <= SURE or not metadata.mounting:
         rest.append("a wrong mounting (--laser x,y,yaw_deg, --flip)")

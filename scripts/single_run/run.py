@@ -2,7 +2,7 @@
 """SLAMs on a recorded log or on a simulated tour: what is understood of it, in which map."""
 
 import hashlib
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from datetime import UTC, datetime
 from pathlib import Path
@@ -103,16 +103,17 @@ class Log:
 
     strict       refuse repairs, a mounting that its scans contradict, and a run that nobody trusts
     text_format  describes a text log
-    laser, flip  how the scanner is mounted, where the log does not say it: ``mount_of``
-    scan, odometry  topics of a bag: ``slam.logs.bag_topics.Asked``
+    scan         topics of a bag's scanners; None: the likeliest
+    odometry     topic of a bag's; None: the likeliest
+    laser, flip  how the scanners are mounted, where the log does not say it: ``mount_of``
     """
 
     path: Path
     strict: bool = False
     text_format: Path | None = None
-    laser: str | None = None
+    scan: Sequence[str] | None = None
+    laser: Sequence[str] | None = None
     flip: bool = False
-    scan: str | None = None
     odometry: str | None = None
 
 
@@ -130,7 +131,8 @@ def on_log(
     with working(f"reading {path.name}"):
         footage = of_log(
             path, strict=log.strict, text_format=log.text_format,
-            mount=mount_of(log.laser), flip=log.flip, asked=Asked(log.scan, log.odometry),
+            asked=[Asked(scan, log.odometry) for scan in log.scan or (None,)],
+            mounts=[mount_of(text) for text in log.laser or ()], flip=log.flip,
         )  # fmt: skip
     found = tell(footage, strict=log.strict)
     show = footage.show(names)

@@ -60,7 +60,7 @@ class Session:
     found     False: the start is unknown and is searched for
     """
 
-    cells_hold = "activities"
+    cells_hold, takes_several = "activities", True
 
     def __init__(
         self, tracker: Tracker, *, time_s: float, history: History | None = None, found: bool = True

@@ -56,12 +56,16 @@ class Consistency:
 
 
 class KeptScans:
-    """Scans of a run, some way apart, to be laid on each other by poses that come later."""
+    """Scans of a run, some way apart, to be laid on each other by poses that come later.
+
+    Of several scanners those of the first: what two see of one place is not the same.
+    """
 
     def __init__(self) -> None:
         self._frames = 0
         self._step = 1
         self._last: Float | None = None
+        self._mount: tuple[float, ...] | None = None
         self._at: list[int] = []
         self._points: list[Float] = []
 
@@ -69,6 +73,9 @@ class KeptScans:
         """The next frame, and where the robot is about, (3,) in any frame of reference."""
         index, self._frames = self._frames, self._frames + 1
         if frame.scan is None or not frame.scan.valid.any():
+            return
+        mount = self._mount = self._mount or frame.scan.spec.mount
+        if frame.scan.spec.mount != mount:
             return
         if self._last is not None:
             step = se2.between(self._last, pose)

@@ -137,6 +137,7 @@ class Prediction:
     covariance   (3, 3) of the increment, in the map frame, scaled and floored
     twist        (3,) body velocity for de-skewing
     elapsed      s since the previous frame
+    own          s since the frame's scanner looked before, where the robot has several; else None
     unscaled     (3, 3) as stated or assumed, in the previous robot frame; zero: nothing to learn
     floor        m^2 and rad^2 that were added
     loosened     (3, 3) that the matcher's prior of the increment has more than the covariance
@@ -153,6 +154,12 @@ class Prediction:
     floor: tuple[float, float] = (0.0, 0.0)
     loosened: Float = field(default_factory=lambda: np.zeros((3, 3)))
     carried: Float = field(default_factory=lambda: np.zeros((3, 3)))
+    own: float | None = None
+
+    @property
+    def look(self) -> float:
+        """s that the map sees this scan for."""
+        return self.elapsed if self.own is None else self.own
 
     def changed(self, **fields: Any) -> "Prediction":
         """``replace`` at a fifth of its time."""

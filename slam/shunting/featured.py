@@ -114,7 +114,7 @@ class FeaturedShuntingSlam(ShuntingSlam):
     def _match(
         self, observations: Observations, prediction: Prediction, cell_map: CellMap
     ) -> Match:
-        step = min(max(prediction.elapsed, 1e-3), self.config.map.longest_look_s)
+        step = min(max(prediction.look, 1e-3), self.config.map.longest_look_s)
         self._steps_s.append(step)
         if self._first_counts_s > 0.0:  # however long it acted, it was one look
             age = self.network.cells.age

@@ -31,6 +31,7 @@ from slam.tracker.cells import MOST_OFF
 from slam.tracker.config import TrackerConfig
 from slam.tracker.matching.matcher import Match, Matcher, unmatched
 from slam.tracker.rasterise import rasterise
+from slam.tracker.scanners import Scanners
 from slam.tracker.standing.config import StandingConfig
 from slam.tracker.standing.recent import Standing
 from slam.tracker.tracking.loops import Loops
@@ -49,6 +50,7 @@ class Tracker(abc.ABC):
     """
 
     config_class: ClassVar[type[TrackerConfig]]
+    takes_several: ClassVar[bool] = True
     map_moves: ClassVar[bool] = True  # with the loops that are closed, if the config says so
 
     def __init__(self, config: TrackerConfig | str | Mapping[str, Any] = "robust") -> None:
@@ -80,6 +82,7 @@ class Tracker(abc.ABC):
         """Forget everything; the next frame is the origin of the map."""
         self.cell_map = self._new_map(self.config)
         self._matcher = Matcher(self.config)
+        self._scanners = Scanners(self._matcher)
         self._before: Odometry | None = None
         self._T_map_robot: Float = np.zeros(3)
         self._pose_covariance = PoseCovariance(self.config)
@@ -122,7 +125,7 @@ class Tracker(abc.ABC):
             return self._first(frame)
         self._path.check_order(frame.stamp_ns)
         self._correct()
-        prediction = self._predict(frame.odometry)  # 1 odometry prior
+        prediction = self._predict(frame)  # 1 odometry prior
         observations = observe(frame, prediction.twist, self.config)  # 2 de-skewed points, view
         observations = self._standing.weighted(
             frame.stamp_ns, prediction.T_map_robot, prediction.prior, observations
@@ -139,6 +142,7 @@ class Tracker(abc.ABC):
         return estimate
 
     def _first(self, frame: Frame) -> Estimate:
+        self._scanners.look(frame)
         twist = frame.odometry.twist
         moving = np.zeros(3) if twist is None else np.asarray(twist)
         observations = observe(frame, moving, self.config)
@@ -174,10 +178,12 @@ class Tracker(abc.ABC):
         self._standing.moved(T_new_old)
         self._pose_covariance.turned(float(T_new_old[2]))
 
-    def _predict(self, odometry: Odometry) -> Prediction:
+    def _predict(self, frame: Frame) -> Prediction:
         """By odometry; on the first frame with a loaded map, where the robot was before."""
+        odometry, look = frame.odometry, self._scanners.look(frame)
         if self._before is not None:
-            return self._odometry_noise.predict(self._T_map_robot, self._before, odometry)
+            found = self._odometry_noise.predict(self._T_map_robot, self._before, odometry)
+            return found if look is None else found.changed(own=look)
         assert self._pose_covariance.loaded is not None
         return Prediction(
             T_map_robot=self._T_map_robot,
@@ -191,8 +197,12 @@ class Tracker(abc.ABC):
         """The pose, and what is to be made of it.
 
         The prior is wider where enough is in view to correct what odometry alone gave for the pose
-        before.
+        before. The first scan of one more scanner is taken where motion leads: what it sees may
+        be in no map yet.
         """
+        if self._scanners.new and self._trusted and self._belief.certain:
+            led, state = unmatched(prediction.T_map_robot, matched=1.0, score=0.0), State.TRACKING
+            return Judged(led, prediction, state, self.cell_map, writes=True, followed=False)
         relocalise = self.config.tracking.relocalise
         if observations.amount >= relocalise.least_weight:
             motion = prediction.T_map_robot - self._T_map_robot
@@ -210,7 +220,8 @@ class Tracker(abc.ABC):
         Old surface is noted in doubt, too: the first match after it needs that of now.
         """
         match, elapsed = judged.match, judged.prediction.elapsed
-        T_map_robot, step = match.T_map_robot, min(elapsed, self.config.map.longest_look_s)
+        look, longest_s = judged.prediction.look, self.config.map.longest_look_s
+        T_map_robot, step = match.T_map_robot, min(look, longest_s)
         tracked, residuals = judged.state is State.TRACKING, None
         if tracked or judged.followed:
             short_term, turn = self._matcher.reward.short_term, self._loops.n_frames
@@ -225,7 +236,7 @@ class Tracker(abc.ABC):
             rasterise(self.cell_map, observations, T_map_robot)
             T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
             self.cell_map.integrate(observations.view, T_map_laser, step, write=True)
-            if tracked:
+            if tracked and judged.followed:
                 self._belief.learn(judged)
         return residuals if tracked else None
 

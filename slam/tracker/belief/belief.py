@@ -119,7 +119,7 @@ class Belief:
         goes_on, nats = self._going_on(doubt, observations, match, share)
         self._unknown = min(max(self._unknown - nats, -MOST_NATS), MOST_LOST)
         if goes_on:
-            self._matcher.usual.follow(match, observations, prediction.elapsed)
+            self._matcher.usual.follow(match, observations, prediction.look)
         elif match.tau > 0.0:  # by odometry: what it was matched to says nothing
             by_odometry = unmatched(prediction.T_map_robot, matched=match.matched, score=0.0)
             match = replace(by_odometry, overlapped=match.overlapped)
@@ -233,7 +233,7 @@ class Belief:
         if (goes_on or nowhere) and self.p_lost <= frozen_above:
             return self._settled(doubt.local, doubt.match, prediction)
         if goes_on:
-            doubt.write(observations, doubt.match.T_map_robot, prediction.elapsed)
+            doubt.write(observations, doubt.match.T_map_robot, prediction.look)
         state = State.LOST if self.p_lost >= 0.5 else State.FROZEN
         return Judged(doubt.match, prediction, state, doubt.cell_map, followed=goes_on)
 

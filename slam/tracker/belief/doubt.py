@@ -43,13 +43,13 @@ class Doubt:
         """The copy; the map itself until something is written."""
         return self._local
 
-    def write(self, observations: Observations, T_map_robot: Float, elapsed: float) -> None:
-        """Let the copy see a scan; grown by ``MOST_NEW`` blocks, it is begun anew."""
+    def write(self, observations: Observations, T_map_robot: Float, look: float) -> None:
+        """Let the copy see a scan for ``look`` s; begun anew when ``MOST_NEW`` blocks larger."""
         fresh = self._local is self.cell_map
         if fresh or used(self._local.cells) > used(self.cell_map.cells) + MOST_NEW:
             self._local = self.cell_map.twin()
             self._local.off_cm = MOST_OFF  # by how much the map is off is not known
         rasterise(self._local, observations, T_map_robot)
         T_map_laser = se2.compose(T_map_robot, observations.T_robot_laser)
-        step = min(elapsed, self._local.config.map.longest_look_s)
+        step = min(look, self._local.config.map.longest_look_s)
         self._local.integrate(observations.view, T_map_laser, step, write=True)

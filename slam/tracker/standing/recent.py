@@ -2,6 +2,7 @@
 """The scans of the last seconds, kept to say which present returns come from what stands."""
 
 import math
+from collections import defaultdict
 from dataclasses import dataclass, replace
 from itertools import accumulate
 
@@ -27,14 +28,14 @@ class KeptScan:
 
 
 class Standing:
-    """Gives each return its weight, by how long its place was not seen empty.
+    """Gives each return its weight, by how long its place was not seen empty by its own scanner.
 
     agreement  of odometry with what was matched with these weights
     """
 
     def __init__(self, config: StandingConfig) -> None:
         self._config, self.agreement = config, Agreement(config)
-        self._kept: list[KeptScan] = []
+        self._kept = defaultdict[bytes, list[KeptScan]](list)  # by mount
         # a little less, as scans come when they come
         first_s = 0.95 * config.spacing_s
         self._ages_s = [first_s * config.ages_grow**k for k in range(config.views)]
@@ -43,7 +44,7 @@ class Standing:
         """Keep a scan that was tracked."""
         if self._config.settled_s == 0.0 or not len(seen.points_robot):
             return
-        kept, config = self._kept, self._config
+        kept, config = self._kept[seen.T_robot_laser.tobytes()], self._config
         if len(kept) > 1 and stamp_ns - kept[-2].stamp_ns < config.spacing_s * NS_PER_S:
             kept.pop()  # the newest is always there
         points_map = np.empty(seen.points_robot.shape)
@@ -64,21 +65,22 @@ class Standing:
     def moved(self, T_new_old: Float) -> None:
         """The map moved: so did what was seen in it."""
         self.agreement.turned(float(T_new_old[2]))
-        self._kept = [
-            replace(
-                kept,
-                T_map_laser=se2.compose(T_new_old, kept.T_map_laser),
-                points_map=se2.transform(T_new_old, kept.points_map),
-            )
-            for kept in self._kept
-        ]
+        for kept in self._kept.values():
+            kept[:] = [
+                replace(
+                    one,
+                    T_map_laser=se2.compose(T_new_old, one.T_map_laser),
+                    points_map=se2.transform(T_new_old, one.points_map),
+                )
+                for one in kept
+            ]
 
-    def _asked(self, stamp_ns: int, step: float) -> list[KeptScan]:
+    def _asked(self, stamp_ns: int, seen: Observations) -> list[KeptScan]:
         """The newest, and of the others about one of each age."""
         chosen, least_s = [], -math.inf
-        for kept in reversed(self._kept):
+        for kept in reversed(self._kept[seen.T_robot_laser.tobytes()]):
             age_s = (stamp_ns - kept.stamp_ns) / NS_PER_S
-            if kept.step != step or age_s < least_s:
+            if kept.step != seen.view.step or age_s < least_s:
                 continue
             chosen.append(kept)
             least_s = next((older_s for older_s in self._ages_s if older_s > age_s), math.inf)
@@ -92,7 +94,7 @@ class Standing:
         ``T_map_robot``: a pose predicted with a (3, 3) prior.
         """
         config, points, n = self._config, seen.points_robot, len(seen.points_robot)
-        kept = self._asked(stamp_ns, seen.view.step) if config.settled_s > 0.0 else []
+        kept = self._asked(stamp_ns, seen) if config.settled_s > 0.0 else []
         if not kept or not n:
             return seen.weighted(np.ones(n))
         place, heading = max(float(prior[0, 0]), float(prior[1, 1])), float(prior[2, 2])

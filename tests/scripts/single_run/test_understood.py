@@ -80,11 +80,13 @@ def test_a_scanner_mounted_backwards_without_transform_is_named_with_its_flag(
 def test_with_the_flag_that_was_asked_for_all_is_well(
     without: Path, capsys: pytest.CaptureFixture[str], caplog: pytest.LogCaptureFixture
 ) -> None:
-    footage = of_log(without, mount=log_words.mount_of("0.1,0,180"))
+    footage = of_log(without, mounts=[log_words.mount_of("0.1,0,180")])
     line, warned = said(footage, capsys, caplog)
     assert "turned 180° on the robot, by --laser" in line
     assert warned == ""
-    flipped = said(of_log(without, mount=log_words.mount_of("0 0 180"), flip=True), capsys, caplog)
+    flipped = said(
+        of_log(without, mounts=[log_words.mount_of("0 0 180")], flip=True), capsys, caplog
+    )
     assert "agree under --laser 0,0,180 --flip (" in flipped[1]
 
 
@@ -96,8 +98,8 @@ def test_what_is_no_place_is_refused(text: str) -> None:
 
 def test_a_run_that_nobody_trusts_names_the_likeliest_cause_first(without: Path) -> None:
     footage = of_log(without)
-    assert footage.tested is not None
-    found = footage.tested.told()
+    (test,) = footage.tested.values()
+    found = test.told()
 
     def track(doubted: int) -> Any:
         estimates = [SimpleNamespace(converged=k >= doubted) for k in range(10)]

@@ -1,6 +1,8 @@
 # SPDX-License-Identifier: Apache-2.0
 """A run that agrees with itself, and one that does not."""
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 
@@ -65,3 +67,18 @@ def test_the_same_run_lying_elsewhere_agrees_as_well(kept: tuple[KeptScans, Floa
 
 def test_nothing_is_said_of_a_run_without_scans() -> None:
     assert KeptScans().judged(np.zeros((5, 3))) is None
+
+
+def test_of_two_scanners_the_scans_of_the_first_are_judged() -> None:
+    front = laser(91)
+    rear = replace(front, T_robot_laser=np.array([-0.3, 0.0, np.pi]))
+    both = frames(
+        World2D(office()), office_loop(), rate_hz=1.0, spec=[front, rear], apart_s=0.5, seed=2
+    )
+    found = []
+    for stream in (both, both[::2]):
+        scans = KeptScans()
+        for frame in stream:
+            scans.note(frame, np.asarray(frame.truth))
+        found.append(scans.judged(np.array([frame.truth for frame in stream])))
+    assert found[0] == found[1]
