@@ -19,12 +19,12 @@ from slam.logs import open_log
 
 HERE = Path(__file__).parent
 PAGE, MARK = HERE.parents[2] / "docs" / "logs.md", "kinds"
-HEADS = ("in the file", "what is done", "what is said")
+HEADS = ("in the file", "what is done", "what is said", "`--strict`")
 
 
 @dataclass(frozen=True, kw_only=True)
 class Kind:
-    """A kind of input. The first three are cells of the page's table.
+    """A kind of input. The first three and the last are cells of the page's table.
 
     done    what is done with it
     said    in a warning, in the line of what was understood, or in the error; "…" stands for what
@@ -67,8 +67,11 @@ def gathered() -> list[Kind]:
 
 def told(kinds: Sequence[Kind]) -> str:
     """The table of the page."""
-    rows = [(kind.name, kind.done, f"`{kind.said}`" if kind.said else "") for kind in kinds]
-    return table(HEADS, rows, left=3)
+    rows = [
+        (one.name, one.done, f"`{one.said}`" if one.said else "", "refused" * one.strict)
+        for one in kinds
+    ]
+    return table(HEADS, rows, left=len(HEADS))
 
 
 if __name__ == "__main__":

@@ -26,6 +26,8 @@ def test_what_is_done_and_said(kind: Kind, tmp_path, caplog):
     if kind.strict:
         with pytest.raises(MobiliaError, match="--strict"):
             kind.read(path, True)
+    else:
+        kind.check(kind.read(path, True)[1])
 
 
 @pytest.mark.docs
