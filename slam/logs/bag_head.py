@@ -103,7 +103,7 @@ class Head:
                 ):
                     found.append((rank, topic, child, name))
         way = [] if found else odometry_way(self.links, frame, topics.child)
-        if not (found or way or self.children) and self._drives:
+        if not (found or way or any(self.children.values())) and self._drives:
             found = [((), self._drives[0], "", self._drives[0])]  # it begins later
         _, odometry, child, name = min(found, default=((), None, "", ""))
         if way:
