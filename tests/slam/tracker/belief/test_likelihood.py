@@ -92,7 +92,7 @@ def test_too_little_in_view_says_nothing() -> None:
 
     belief._match = matched
     said(system, going_on(still(ROOMS, at(system), 0.2), last)[:1])
-    match = matched(seen[0], system._predict(last.odometry), system.cell_map)
+    match = matched(seen[0], system._predict(last), system.cell_map)
     few = FAST.tracking.relocalise.least_weight / seen[0].amount
     for share, silent in ((0.99 * few, True), (1.01 * few, False)):
         less = replace(seen[0], shares=share * seen[0].shares)
