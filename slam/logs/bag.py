@@ -34,6 +34,7 @@ from slam.logs.ros_numbers import planar
 from slam.logs.text import about
 
 PATIENCE_NS = 2 * NS_PER_S  # how long a scan waits for its odometry
+MOST_AHEAD = 5000  # labels before their scans: a recording of ours packs them apart
 PLANAR = np.array([[6 * i + j for j in (0, 1, 5)] for i in (0, 1, 5)])
 _log = logging.getLogger(__name__)
 
@@ -132,9 +133,9 @@ class Assembly:
             return None
         truth = self._truth.at(stamp_ns)
         labels = self._labels.pop(stamp_ns, None)
-        if len(self._increments) > 1000 or len(self._labels) > 100:  # of scans that are not there
-            self._increments.clear()
-            self._labels.clear()
+        for kept in (self._increments, self._labels):
+            while kept and (next(iter(kept)) < stamp_ns or len(kept) > MOST_AHEAD):
+                del kept[next(iter(kept))]  # of a scan that is not there
         self._given += 1
         return Frame(
             stamp_ns=stamp_ns,
