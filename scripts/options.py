@@ -38,6 +38,11 @@ SCANNER = partial(
     "full",
     complete=SCANNERS,
 )
+ALSO_AT = partial(
+    option,
+    "Another scanner of that model at x,y,yaw_deg on the robot (m, m, deg); or several, each with "
+    "the option again.",
+)
 CROWD = partial(
     option,
     "Who is there besides: none, or like escorts:6,boards:2; default the scene's own at "
@@ -166,13 +171,32 @@ class Tour:
     seed: int = SEED(0)
     scan_height: float = option("Height of the simulated scanner above the floor, m.", 0.36)
     scanner: str = SCANNER()
+    also_at: list[str] | None = ALSO_AT()
 
     def settings(self, scene: str) -> dict[str, Any]:
         """All of it and the scene, for a recipe and for ``Simulation``."""
         return {
             **self.moves.world(scene, self.seed), "seconds": self.seconds,
             "scan_height_m": self.scan_height, "laser": self.scanner, **self.staged.settings(),
+            **also_at(self.also_at),
         }  # fmt: skip
+
+
+def place_of(text: str, name: str) -> tuple[float, float, float]:
+    """``-0.3,0,180`` as x m, y m, yaw deg; ``name`` of the option."""
+    try:
+        x, y, yaw_deg = (float(word) for word in text.replace(",", " ").split())
+    except ValueError:
+        raise InvalidValueError(f"{name} must be x,y,yaw_deg in m, m, deg, got {text!r}") from None
+    return x, y, yaw_deg
+
+
+def also_at(texts: list[str] | None) -> dict[str, Any]:
+    """Of ``ALSO_AT``, as ``Simulation`` and ``Recipe`` take it; nothing where it is not given."""
+    names = ("x_m", "y_m", "yaw_deg")
+    places = [place_of(text, "--also-at") for text in texts or ()]
+    rows = [dict(zip(names, place, strict=True)) for place in places]
+    return {"also_at": rows} if rows else {}
 
 
 @spec

@@ -22,12 +22,19 @@ class Moment:
     poses   (n, 3) m, m, rad in the world, as ``World.mover_poses``
     moving  (n,) whether it moves just then
     rearranged  what was changed out of sight just before the scan
+    others  the frames of the scanners beside the first, at the same time
     """
 
     frame: Frame
     poses: Float
     moving: NDArray[np.bool_]
     rearranged: tuple[Rearrangement, ...] = ()
+    others: tuple[Frame, ...] = ()
+
+    @property
+    def frames(self) -> tuple[Frame, ...]:
+        """Of all scanners."""
+        return (self.frame, *self.others)
 
 
 def toured(
@@ -54,7 +61,10 @@ def observed(simulation: Simulation) -> Moment:
         row = world.mover_names.index(event.name)
         poses[row], moving[row] = event.after, False
     rearranged = tuple(simulation.rearranged)
-    return Moment(frame=frame, poses=poses, moving=moving, rearranged=rearranged)
+    return Moment(
+        frame=frame, poses=poses, moving=moving, rearranged=rearranged,
+        others=simulation.frames_of_others,
+    )  # fmt: skip
 
 
 def thinned(moments: Iterable[Moment], every: int) -> Iterator[Moment]:

@@ -22,6 +22,7 @@ from sim.sensors.lidar.registry import ScannerConfig
 from sim.sensors.odometry.encoders import WheelOdometry
 from sim.world.kidnapping import Kidnapping
 from sim.world.labels import BeamLabeller
+from sim.world.robots import places_of
 from sim.world.script import Script, cues_of, of_file, visitors
 from sim.world.sweep import Sweep
 from sim.world.world import World
@@ -36,6 +37,7 @@ from slam.frames import (
     Stream,
     StreamMetadata,
 )
+from slam.logs.together import one_by_one
 from slam.shaped import Positive, shaped
 
 # Of a state, by their words in it.
@@ -68,6 +70,8 @@ class Simulation:
     scene_sha256  that the files of a scene by its file must have (``scenes.scene_file``); None: any
     laser      a scanner by name ("utm30lx", "lms221:noise"; ``sim.sensors.lidar.registry``), a
                ``Scanner`` or a ``Lms221Config``; default the LMS-221 with every effect
+    also_at    further scanners of that model on the robot, at the same height, turning with the
+               first: (x_m, y_m, yaw_deg) of each by name (``sim.world.robots.Place``)
     odometry   preset of the wheel encoders: "pioneer3dx", "probabilistic_robotics", "ideal"
     drive      limits of the robot
     start      (x m, y m, heading rad) of the robot, where the scene's own is not wanted; a crowd
@@ -94,6 +98,7 @@ class Simulation:
         robot: str | Mapping[str, Any] | None = None,
         scene_sha256: str | None = None,
         laser: ScannerConfig | str | None = None,
+        also_at: Sequence[Mapping[str, float]] | None = None,
         odometry: str = "pioneer3dx",
         drive: DriveConfig | None = None,
         start: Sequence[float] | None = None,
@@ -119,12 +124,14 @@ class Simulation:
         if kidnap_every_s is not None:
             self._kidnapping = Kidnapping(kidnap_every_s, seeds)
         self.laser = LaserScanner(self.world.model, laser, seeds.generator("lidar"))
+        if also_at is not None:
+            self.laser.beside(places_of(also_at), seeds.sequence("lidar"))
         track = self.world.drive_config.track
         self.encoders = WheelOdometry(odometry, seeds.generator("odometry"), track=track)
-        self._labeller = BeamLabeller(self.world) if labels else None
+        self._labeller = BeamLabeller(self.world, len(self.specs)) if labels else None
         self._stamp_ns = 0
         self._scan: ScanResult | None = None
-        self._labels: BeamLabels | None = None
+        self._labels: list[BeamLabels | None] = []
         self._frame: Frame | None = None
         self.contacts: list[Contact] = []  # what the robot touched during the last scan
         self.rearranged: list[Rearrangement] = []  # what changed out of sight just before it
@@ -134,6 +141,11 @@ class Simulation:
     def spec(self) -> LaserSpec:
         """Geometry and timing of the scanner, as in every frame's scan."""
         return self.laser.spec
+
+    @property
+    def specs(self) -> tuple[LaserSpec, ...]:
+        """Of all scanners, the first and those beside it."""
+        return (self.spec, *self.laser.others)
 
     def use_laser(self, laser: LaserScanner) -> None:
         """Go on with another scanner of the same timing on the same robot."""
@@ -156,11 +168,11 @@ class Simulation:
     def _changed_out_of_sight(self) -> list[Rearrangement]:
         """What is put elsewhere before this scan."""
         if self._change_at_s is None:
-            return self.world.rearrange(self.spec)
+            return self.world.rearrange(*self.specs)
         if self._changed or self.world.time_ns < round(self._change_at_s * NS_PER_S):
             return []
         self._changed = True
-        return self.world.rearrange(self.spec, at_once=True)
+        return self.world.rearrange(*self.specs, at_once=True)
 
     def observe(self) -> Frame:
         """Let one scan's worth of time pass under the present command; the frame it gives.
@@ -192,8 +204,11 @@ class Simulation:
     def look(self) -> ScanResult:
         """The scan of the time that ``live`` let pass."""
         self._scan, self._frame = self.laser.finish(), None
-        self.world.saw(self._scan.bodies)
-        self._labels = self._labeller.label(self._scan) if self._labeller else None
+        scans = [self._scan, *self.laser.seen_by_others]
+        for scan in scans:
+            self.world.saw(scan.bodies)
+        of = self._labeller
+        self._labels = [of.label(scan, k) if of else None for k, scan in enumerate(scans)]
         return self._scan
 
     def blink(self) -> None:
@@ -215,9 +230,18 @@ class Simulation:
                 odometry=self.encoders.reading(stamp_ns=stamp_ns, sweep_s=sweep_s),
                 scan=Scan(stamp_ns=stamp_ns, ranges=self._scan.ranges, spec=self.spec),
                 truth=self._sweep.timing.truth(self.path),
-                labels=self._labels,
+                labels=self._labels[0],
             )
         return self._frame
+
+    @property
+    def frames_of_others(self) -> tuple[Frame, ...]:
+        """``frame`` with the scan of each scanner beside the first instead, at the same time."""
+        if self.frame is None:
+            return ()
+        seen = zip(self.specs[1:], self.laser.seen_by_others, self._labels[1:], strict=True)
+        scans = [(Scan(stamp_ns=self._stamp_ns, ranges=s.ranges, spec=of), n) for of, s, n in seen]
+        return tuple(replace(self.frame, scan=scan, labels=labels) for scan, labels in scans)
 
     def save_state(self) -> bytes:
         """World, scanner, encoders, labels: all that decides what comes next.
@@ -291,7 +315,7 @@ class Simulation:
     def metadata(self) -> StreamMetadata:
         """What a recording says about itself; ``extra`` has a session, where there is one."""
         session = {} if self.session is None else {"session": self.session}
-        return StreamMetadata(
+        first = StreamMetadata(
             source="simulation",
             scene=self.world.scene.name,
             seed=self.world.seeds.seed,
@@ -305,16 +329,21 @@ class Simulation:
                 **session,
             },
         )
+        return replace(first, others=tuple(replace(first, laser=one) for one in self.laser.others))
 
 
 def tour(
     simulation: Simulation, seconds: float, config: TourConfig | None = None
 ) -> Iterator[Frame]:
     """Frames of ``seconds`` of driving round the scene's goals, avoiding what truly is there."""
-    pilot = Pilot(simulation.world, config)
-    for _ in range(n_frames(seconds, simulation.scan_period_s)):
-        simulation.world.set_command(*pilot.command(simulation.scan_period_s))
-        yield simulation.observe()
+
+    def frames() -> Iterator[tuple[Frame, ...]]:
+        pilot = Pilot(simulation.world, config)
+        for _ in range(n_frames(seconds, simulation.scan_period_s)):
+            simulation.world.set_command(*pilot.command(simulation.scan_period_s))
+            yield simulation.observe(), *simulation.frames_of_others
+
+    return one_by_one(frames())
 
 
 def checked_moment(change_at_s: float | None, session: int | None = None) -> float | None:
@@ -354,6 +383,8 @@ def stream(
     probe = Simulation(scene, **settings)
     metadata, n = probe.metadata(), n_frames(seconds, probe.scan_period_s)
     config: Any = probe.laser.config  # the link refuses any but the LMS-221
+    if baud is not None and probe.laser.others:
+        raise InvalidValueError(f"baud is of one scanner's line, and also_at has more: {baud}")
     link = None if baud is None else SerialLink(baud=baud, config=config)
     if link is not None:
         line = {"baud": link.baud, "latency_ns": link.latency_ns}
@@ -363,5 +394,5 @@ def stream(
         driven = tour(Simulation(scene, **settings), seconds)
         return driven if link is None else over_link(driven, link)
 
-    length = n if link is None else sum(map(link.sends, range(n)))
+    length = n * len(probe.specs) if link is None else sum(map(link.sends, range(n)))
     return Stream(metadata=metadata, frames=frames, length=length)

@@ -91,6 +91,10 @@ def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> 
         raise LogFormatError(
             folder, f"a {found.twin} twin cannot be changed: take an episode made without --twins"
         )
+    if found.settings.get("also_at"):
+        raise LogFormatError(
+            folder, "a drive with several scanners cannot be changed: take one without --also-at"
+        )
     usual = "odometry" if found.slams else "shunting"
     slam = admitted(slam or found.slam or usual, "SLAM", trust)
     if is_run(folder):

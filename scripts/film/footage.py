@@ -169,7 +169,7 @@ def of_simulation(
     stream = Stream(
         metadata=simulation.metadata(),
         frames=stage.frames,
-        length=-(-n_frames(seconds, simulation.scan_period_s) // every),
+        length=-(-n_frames(seconds, simulation.scan_period_s) // every) * len(simulation.specs),
     )
     made_with = {"odometry": simulation.odometry_preset, **simulation.metadata().extra}
     return Footage(

@@ -15,6 +15,7 @@ from sim.view.mapview import MapView
 from sim.view.parts import Placed
 from sim.world.world import World
 from slam.frames import Frame
+from slam.logs.together import one_by_one
 
 Bounds = tuple[float, float, float, float]
 
@@ -83,13 +84,16 @@ class Room(Stage):
 
     def frames(self) -> Iterator[Frame]:
         """The frames of a run; the stage shows the moment of the one given last."""
+        return one_by_one(self._frames())
+
+    def _frames(self) -> Iterator[tuple[Frame, ...]]:
         self._watch = EventWatch(self.world)
         before = Placed.of(self.world)
         for moment in self._moments():
             self._moment = moment
             self.placed, before = before, Placed.of(self.world)
             self._watch.note(moment)
-            yield moment.frame
+            yield moment.frames
 
     def open(self, layout: Layout) -> None:
         """Make what paints the panes."""

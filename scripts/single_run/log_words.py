@@ -9,6 +9,7 @@ import numpy as np
 
 from scripts.console import say
 from scripts.film.footage import Footage
+from scripts.options import place_of
 from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import Float, StreamMetadata
 from slam.logs.mounting import Mounting
@@ -31,10 +32,7 @@ class UntrustedRunError(MobiliaError):
 
 def mount_of(text: str) -> Float:
     """``--laser 0.1,0,180`` as (3,) m, m, rad."""
-    try:
-        x, y, yaw_deg = (float(word) for word in text.replace(",", " ").split())
-    except ValueError:
-        raise InvalidValueError(f"--laser must be x,y,yaw_deg in m, m, deg, got {text!r}") from None
+    x, y, yaw_deg = place_of(text, "--laser")
     return np.array([x, y, math.radians(yaw_deg)])
 
 

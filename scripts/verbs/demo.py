@@ -24,7 +24,7 @@ class Demo:
     out: Path = option("Folder to write.", Path("out/demo"), writes=True)
     scene: str = option("Scene to drive in.", "office", complete=SCENES)
     tour: options.Tour = part(
-        options.Tour, without=("events", "robot"), change=0.0, crowd="none", seed=2
+        options.Tour, without=("events", "robot", "also_at"), change=0.0, crowd="none", seed=2
     )
     overwrite: bool = options.OVERWRITE()
     film: bool = options.FILM(True)

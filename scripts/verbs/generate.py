@@ -55,6 +55,7 @@ class Generate:
     sessions: int = option("So many sessions of one building instead, --change apart.", 0)
     work: options.Work = part(options.Work, without=("plan_only",))
     scanner: str = options.SCANNER()
+    also_at: list[str] | None = options.ALSO_AT()
     staged: options.Staged = part(options.Staged)
     plan_only: bool = options.PLAN()
 
@@ -79,6 +80,7 @@ class Generate:
             scene=rooms[0], seed=self.seed, dynamism=levels[0], motion=moves.motion,
             change=moves.change, seconds=self.seconds, scanner=self.scanner,
             options=options.options_with(moves.crowd), **self.staged.settings(),
+            **options.also_at(self.also_at),
         )  # fmt: skip
         usual = 1 if self.episodes is None else self.episodes
         plan = Plan(

@@ -11,6 +11,7 @@ where one thing is absent, and nothing but a few marks has to be saved.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any
 
@@ -23,7 +24,7 @@ from scenes.assembly import room_of
 from scenes.scene import Mover, Pose, Scene
 from sim.core.bodies import Bodies
 from sim.core.seeds import uniform
-from sim.core.sight import Eye, View, hidden, opaque_boxes
+from sim.core.sight import Eye, View, hidden, opaque_boxes, view_of
 from sim.sensors.lidar.surfaces import glass_geoms
 from slam._jit import njit
 from slam.frames import Float, LaserSpec
@@ -144,7 +145,7 @@ class Rearranging:
         self._radius = np.array([room_of(m) for m in scene.movers])
         self._rows = [k for k, m in enumerate(scene.movers) if is_movable(m)]
         self._opaque = opaque_boxes(model, scene.scan_height_m, glass_geoms(model))
-        self._eye: tuple[LaserSpec, Eye] | None = None
+        self._eyes: tuple[Sequence[LaserSpec], list[Eye]] = ((), [])
         self.marks = np.zeros((len(scene.movers), 3), dtype=np.int64)
         self.moment = np.zeros(1, dtype=np.int64)
 
@@ -170,17 +171,18 @@ class Rearranging:
         note_seen(hit, self._bodies.mover_of_body, self.marks)
 
     def rearrange(
-        self, time_s: float, spec: LaserSpec, poses: Float, busy: NDArray[np.bool_]
+        self, time_s: float, specs: Sequence[LaserSpec], poses: Float, busy: NDArray[np.bool_]
     ) -> list[Rearrangement]:
         """Write the new poses of what is rearranged into ``poses`` (n, 3).
 
+        specs  of the robot's scanners
         busy  (n,) things that nobody may take: held, sat on, or absent
         """
-        if self._eye is None or self._eye[0] is not spec:
-            self._eye = (spec, Eye.of(spec))
+        if self._eyes[0] != specs:
+            self._eyes = (specs, [Eye.of(spec) for spec in specs])
         robot = self._bodies.robot
         assert robot is not None
-        view = self._eye[1].view(poses[robot], self._opaque)
+        view = view_of(self._eyes[1], poses[robot], self._opaque)
         drawn, back = self._drawn(poses, view, busy)
         done: list[Rearrangement] = []
         left = self._swap(time_s, drawn, poses, done)

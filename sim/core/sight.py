@@ -1,11 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
-"""What lies out of view of a scanner: behind what never moves, or outside its field of view.
+"""Out of view of a robot's scanners: behind what never moves, or outside their fields of view.
 
 Only upright static boxes at the scanner's height hide anything (walls, cabinets): neither glass,
 nor a table's legs, nor anything that moves. So what is said to be hidden truly is.
 """
 
 import math
+from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Any, NamedTuple
 
@@ -27,23 +28,20 @@ SLACK_M = 0.1  # m a box must stand above and below the scan plane, as beams spr
 
 
 class View(NamedTuple):
-    """A scanner somewhere: x, y m and heading rad of the middle of its field of view.
+    """Scanners somewhere.
 
-    half   rad, half of that field            reach  m, of its beams
-    depth  (RAYS,) m to the first static box by direction in the world
+    eyes   (n, 5) x, y m and heading rad of the middle of each one's field of view, half of that
+           field rad, reach of its beams m
+    depth  (n, RAYS) m to the first static box by direction in the world
     """
 
-    x: float
-    y: float
-    heading: float
-    half: float
-    reach: float
+    eyes: Float
     depth: Float
 
 
 def nobody() -> View:
     """The view of nobody: everything is hidden."""
-    return View(1e9, 1e9, 0.0, 0.0, 0.0, np.zeros(RAYS))
+    return View(np.zeros((0, 5)), np.zeros((0, RAYS)))
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -62,10 +60,12 @@ class Eye:
         mounted = se2.compose(spec.T_robot_laser, np.array([0.0, 0.0, middle]))
         return cls(mounted=mounted, half=half, reach=float(spec.range_max))
 
-    def view(self, robot: Float, boxes: Float) -> View:
-        """From where the robot stands, (3,) m, m, rad, among ``opaque_boxes``."""
-        x, y, heading = se2.compose(robot, self.mounted).tolist()
-        return View(x, y, heading, self.half, self.reach, depths(x, y, boxes))
+
+def view_of(eyes: Sequence[Eye], robot: Float, boxes: Float) -> View:
+    """From where the robot stands, (3,) m, m, rad, among ``opaque_boxes``."""
+    at = [se2.compose(robot, eye.mounted).tolist() for eye in eyes]
+    rows = [(*pose, eye.half, eye.reach) for pose, eye in zip(at, eyes, strict=True)]
+    return View(np.array(rows), np.array([depths(x, y, boxes) for x, y, _ in at]))
 
 
 def opaque_boxes(model: mujoco.MjModel, height: float, panes: NDArray[np.bool_]) -> Float:
@@ -125,20 +125,28 @@ def depths(x: float, y: float, boxes: Float) -> Float:
 @njit
 def hidden(view: View, x: float, y: float, radius: float) -> bool:
     """Whether nothing of a hull there can be seen, nor is it near."""
-    dx, dy = x - view.x, y - view.y
+    for k in range(len(view.eyes)):  # noqa: SIM110 (kernel)
+        if not _hidden(view.eyes[k], view.depth[k], x, y, radius):
+            return False
+    return True
+
+
+@njit
+def _hidden(eye: Float, depth: Float, x: float, y: float, radius: float) -> bool:
+    dx, dy = x - eye[0], y - eye[1]
     far, reach = math.sqrt(dx * dx + dy * dy), radius + SKIRT_M
     if far < radius + NEAR_M:
         return False
-    if far - reach > view.reach:
+    if far - reach > eye[4]:
         return True
     middle, wide = math.atan2(dy, dx), math.asin(reach / far) + SPOT_RAD
-    off = middle - view.heading
+    off = middle - eye[2]
     off -= math.tau * math.floor(off / math.tau + 0.5)
-    if abs(off) - wide > view.half + ASIDE_RAD:
+    if abs(off) - wide > eye[3] + ASIDE_RAD:
         return True
     first = math.floor((middle - wide) * RAYS / math.tau)
     last = math.ceil((middle + wide) * RAYS / math.tau)
     for k in range(first, last + 1):  # noqa: SIM110 (kernel)
-        if view.depth[k % RAYS] > far - reach:
+        if depth[k % RAYS] > far - reach:
             return False
     return True

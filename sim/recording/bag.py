@@ -7,6 +7,7 @@ import sys
 import zlib
 from collections import defaultdict
 from collections.abc import Iterable, Sequence
+from dataclasses import replace
 from io import BytesIO
 from pathlib import Path
 from typing import Any, Literal
@@ -24,10 +25,11 @@ from rosbags.rosbag2 import CompressionFormat, CompressionMode, StoragePlugin, W
 from scenes import SCAN_HEIGHT
 from scenes.scene import Mover
 from sim.moments import Moment
-from sim.recording.topics import OURS, LabelsMessage, MoreTopics, ObjectsMessage
+from sim.recording.topics import OURS, LabelsMessage, MoreTopics, ObjectsMessage, labels_topic
 from slam.estimate import Raster
 from slam.frames import LaserSpec
-from slam.ros.frames import BEGAN, FrameMessages, Message
+from slam.ros.frames import BEGAN, FrameMessages, Message, place_of, scan_topics
+from slam.ros.messages import LASER
 from slam.ros.template import EPOCH_NS, STORE
 
 if sys.version_info >= (3, 14):
@@ -150,6 +152,7 @@ class MessageHash:
 class BagWriter:
     """Writes the folder ``path``: metadata.yaml and one .mcap; a context manager.
 
+    specs     of the robot's scanners
     movers    of the scene, for /ground_truth/objects
     height_m  of the scanner, for /tf_static
     static_map  what never moves, for /map
@@ -158,11 +161,10 @@ class BagWriter:
     The folder is whole only after the block ends without an exception.
     """
 
-    def __init__(  # noqa: PLR0913 (what a bag may hold)
+    def __init__(
         self,
         path: Path,
-        spec: LaserSpec,
-        *,
+        *specs: LaserSpec,
         movers: Sequence[Mover] = (),
         height_m: float = SCAN_HEIGHT,
         static_map: Raster | None = None,
@@ -170,10 +172,19 @@ class BagWriter:
         intensities: bool = False,
     ) -> None:
         self._frames = FrameMessages(
-            spec, height_m=height_m, static_map=static_map, intensities=intensities
-        )
+            specs[0], others=specs[1:], height_m=height_m, static_map=static_map,
+            intensities=intensities,
+        )  # fmt: skip
         self._has_map = static_map is not None
-        self._labels = LabelsMessage(spec) if labels else None
+        self._labels = [
+            (labels_topic(k), LabelsMessage(spec, LASER + place_of(k)))
+            for k, spec in enumerate(specs if labels else ())
+        ]
+        self._topics, self._lean = [*OURS.values()], set(_LEAN)
+        for k in range(1, len(specs)):
+            labelled = replace(OURS[labels_topic(0)], name=labels_topic(k))
+            self._lean.add(scan_topics(k)[0].name)
+            self._topics += [*scan_topics(k), *([labelled] if labels else [])]
         self._objects = ObjectsMessage(movers) if movers else None
         self._more = MoreTopics()
         self._writer = Writer(path, version=VERSION, storage_plugin=StoragePlugin.MCAP)
@@ -186,10 +197,10 @@ class BagWriter:
         self._writer.open()
         made: dict[str, object] = {
             "/ground_truth/objects": self._objects,
-            "/ground_truth/labels": self._labels,
+            labels_topic(0): self._labels,
             "/map": self._has_map,
         }
-        for topic in (*OURS.values(), *self._more.topics):
+        for topic in (*self._topics, *self._more.topics):
             if made.get(topic.name, True):
                 latched = [_LATCHED] if topic.latched else []
                 self._connections[topic.name] = self._writer.add_connection(
@@ -208,7 +219,7 @@ class BagWriter:
     def write(self, moment: Moment) -> None:
         """Append a frame; ``InvalidValueError`` for one without a scan or of another scanner."""
         frame, stamp_ns = moment.frame, moment.frame.stamp_ns
-        scans = self._frames.scans(frame)
+        scans = self._frames.scans(*moment.frames)
         first = next(scans)
         if not self._started:
             self._started = True
@@ -217,9 +228,9 @@ class BagWriter:
         if self._objects is not None:
             markers = self._objects(stamp_ns, moment.poses, moment.moving)
             self._put("/ground_truth/objects", stamp_ns, markers)
-        if self._labels is not None and frame.labels is not None and frame.scan is not None:
-            labels = self._labels(frame.scan, frame.labels)
-            self._put("/ground_truth/labels", stamp_ns, labels)
+        for (topic, message), each in zip(self._labels, moment.frames, strict=False):
+            if each.labels is not None and each.scan is not None:
+                self._put(topic, stamp_ns, message(each.scan, each.labels))
         self._put_all((first, *scans))
         for topic, data in self._more(moment):
             self._put(topic, stamp_ns, data)
@@ -230,7 +241,7 @@ class BagWriter:
 
     def _put(self, topic: str, stamp_ns: int, data: bytearray) -> None:
         time_ns = stamp_ns + EPOCH_NS
-        self._chunks.turn_to(topic not in _LEAN)
+        self._chunks.turn_to(topic not in self._lean)
         self._writer.write(self._connections[topic], time_ns, data)  # type: ignore[arg-type]
         self._hash.take(topic, time_ns, data)
 

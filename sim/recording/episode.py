@@ -102,7 +102,7 @@ def _write(
     rearranged: list[Rearrangement] = []
     with _whole(parent / recipe.name) as folder:
         bag = BagWriter(
-            folder, simulation.spec, movers=scene.movers, height_m=scene.scan_height_m,
+            folder, *simulation.specs, movers=scene.movers, height_m=scene.scan_height_m,
             static_map=scene.static_map,
         )  # fmt: skip
         with bag:

@@ -27,7 +27,7 @@ from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation, checked_moment
 from sim.twins.twins import TWINS
 from sim.world.kidnapping import Kidnapping
-from sim.world.robots import robot_of
+from sim.world.robots import places_of, robot_of
 from sim.world.script import cues_of
 from sim.world.times_of_day import checked
 from sim.world.world import World
@@ -45,7 +45,7 @@ Seconds = Annotated[float, Meta(gt=0.0, le=MAX_SECONDS)]
 _AXES = ("motion", "change")
 # Added since the first recipes: without a word where they are None.
 _LATER = (*_AXES, "session", "moving_share", "change_at_s", "kidnap_every_s", "events", "robot",
-          "scene_sha256")  # fmt: skip
+          "scene_sha256", "also_at")  # fmt: skip
 # Words for some of these in the name of an episode.
 _WORDS = {"share": "moving_share", "at": "change_at_s", "kidnap": "kidnap_every_s"}
 _DEPENDENCIES = ("mobilia", "mujoco", "numpy", "numba", "llvmlite", "scipy", "rosbags")
@@ -78,6 +78,8 @@ class Recipe:
     robot       tables of another robot than the scene's (``sim.world.robots``); None: its own
     scene_sha256  of the files of a scene by its file (``scenes.scene_file``), found where it is not
                 given; None: of another, or not known
+    also_at     places of further scanners like the first on the robot (``sim.world.robots.Place``);
+                None: it has one
     """
 
     scene: str
@@ -98,6 +100,7 @@ class Recipe:
     events: Sequence[Mapping[str, Any]] | None = None
     robot: Mapping[str, Any] | None = None
     scene_sha256: str | None = None
+    also_at: Sequence[Mapping[str, float]] | None = None
     options: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
@@ -137,7 +140,9 @@ class Recipe:
             cues_of(self.events)
         if self.session is not None:
             checked(self.session)
-        for name in ("kidnap_every_s", "events", "session") if self.twin else ():
+        if self.also_at is not None:
+            places_of(self.also_at)
+        for name in ("kidnap_every_s", "events", "session", "also_at") if self.twin else ():
             if getattr(self, name) is not None:
                 raise InvalidValueError(f"Recipe.{name} and twin exclude each other: {self.twin}")
 

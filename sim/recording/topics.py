@@ -14,7 +14,8 @@ from sim.moments import Moment
 from slam._jit import njit
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import BeamLabels, Float, LaserSpec, Scan
-from slam.ros.frames import SCANS, STATE
+from slam.logs.bag_topics import LABELS
+from slam.ros.frames import SCANS, STATE, scan_topics
 from slam.ros.link import Topic
 from slam.ros.messages import LASER, WORLD
 from slam.ros.template import STORE, Marks, Template, header, message
@@ -112,12 +113,17 @@ def _project(
             x[k] = y[k] = math.nan
 
 
+def labels_topic(number: int) -> str:
+    """Of that scanner of a robot, the first being 0."""
+    return LABELS + (scan_topics(number)[0].name if number else "")
+
+
 class LabelsMessage:
     """sensor_msgs/PointCloud2 in the laser frame, one point a beam; NaN where nothing came back."""
 
     KIND = "sensor_msgs/msg/PointCloud2"
 
-    def __init__(self, spec: LaserSpec) -> None:
+    def __init__(self, spec: LaserSpec, frame: str = LASER) -> None:
         n = spec.n_beams
         data = Marks()(n * POINT.itemsize, np.uint8)
         offsets = {name: POINT.fields[name][1] for name in POINT.names or ()}  # type: ignore[index]
@@ -133,7 +139,7 @@ class LabelsMessage:
         ]
         prototype = message(
             self.KIND,
-            header=header(LASER),
+            header=header(frame),
             height=1,
             width=n,
             fields=fields,

@@ -61,13 +61,14 @@ class Twins:
 
     seconds   of driving                     tour  limits of the driver
     tries     tours tried until one keeps clear of everything in the static twin
-    settings  as for ``Simulation``, without ``kidnap_every_s``, ``session`` and ``events``
+    settings  as for ``Simulation``, without ``kidnap_every_s``, ``session``, ``events``
+              and ``also_at``
 
     Where no crowd is given it is the scene's without escorts: at rest about the robot, they would
     stand in its way. The drive is remembered (1 to 2 KB a scan), frames are simulated again at each
     ``moments``.
     Raises ``InvalidValueError`` when every tour crosses a mover, naming those of the last one, and
-    for ``kidnap_every_s``, ``session`` and ``events``, which a replayed path cannot have.
+    for these four, which a replayed path cannot have.
     """
 
     def __init__(
@@ -81,7 +82,7 @@ class Twins:
         tries: int = 8,
         **settings: Any,
     ) -> None:
-        for taken in ("kidnap_every_s", "session", "events"):
+        for taken in ("kidnap_every_s", "session", "events", "also_at"):
             if settings.get(taken) is not None:
                 raise InvalidValueError(f"Twins take no {taken}, got {settings[taken]!r}")
         seeds = seed if isinstance(seed, Seeds) else Seeds(seed)

@@ -18,15 +18,16 @@ SEMI_STATIC, MOVING = int(BeamClass.SEMI_STATIC), int(BeamClass.MOVING)
 class BeamLabeller:
     """Labels scans of one world and remembers where each mover was when last seen.
 
-    Attribute ``last_seen`` (movers, 3): that memory, NaN for what was never seen.
+    Attribute ``last_seen`` (scanners * movers, 3): that memory, of one scanner after the other, NaN
+    for what was never seen.
     """
 
-    def __init__(self, world: World) -> None:
+    def __init__(self, world: World, scanners: int = 1) -> None:
         self._world = world
-        self.last_seen = np.full((len(world.scene.movers), 3), np.nan)
+        self.last_seen = np.full((scanners * len(world.scene.movers), 3), np.nan)
 
-    def label(self, result: ScanResult) -> BeamLabels:
-        """Labels of the scan that has just been taken.
+    def label(self, result: ScanResult, scanner: int = 0) -> BeamLabels:
+        """Labels of the scan that this scanner has just taken.
 
         ``displacement`` is how far the hit body's origin moved since the scan before that saw it,
         0 the first time and for what cannot move.
@@ -34,7 +35,9 @@ class BeamLabeller:
         world, n = self._world, len(result.bodies)
         kind, displacement = np.empty(n, dtype=np.uint8), np.empty(n, dtype=np.float32)
         movers = (world.bodies.mover_of_body, world.movers_moving(), world.mover_poses())
-        _label(result.bodies, movers, self.last_seen, kind, displacement)
+        first = scanner * len(world.scene.movers)
+        last_seen = self.last_seen[first : first + len(world.scene.movers)]
+        _label(result.bodies, movers, last_seen, kind, displacement)
         return BeamLabels(
             body=result.bodies,
             kind=kind,

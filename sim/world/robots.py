@@ -5,12 +5,13 @@ A robot is a name of ``sim/robots`` or the tables of such a file (``docs/robots.
 """
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
 import mujoco
+import numpy as np
 from msgspec import Meta
 
 from scenes import SCAN_HEIGHT
@@ -18,10 +19,12 @@ from scenes.scene import Scene, at_scan_height
 from sim.actors.robot import DriveConfig
 from slam.bounded import toml_of
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.frames import Float
 from slam.shaped import Table, Word, shaped
 
 FOLDER = Path(__file__).parents[1] / "robots"
 MOST_BYTES = 1 << 14
+MOST_BESIDE = 7  # scanners beside the first
 MASS_KG = 22.0  # of the scenes' robot, to which its tyres' stiffness and grip belong
 Inertia = Annotated[float, Meta(ge=1e-4, le=500.0)]
 Length = Annotated[float, Meta(ge=0.05, le=2.0)]
@@ -50,12 +53,31 @@ class Wheels(Table, frozen=True):
     alpha_radps2: Annotated[float, Meta(ge=0.05, le=50.0)] = 3.0
 
 
-class Mount(Table, frozen=True):
-    """Where its scanner is."""
+class Place(Table, frozen=True):
+    """Of a scanner on its robot."""
 
     x_m: Offset = 0.0
     y_m: Offset = 0.0
     yaw_deg: Annotated[float, Meta(ge=-180.0, le=180.0)] = 0.0
+
+
+def places_of(rows: Sequence[Mapping[str, Any]]) -> list[Float]:
+    """``T_robot_laser`` of scanners beside a robot's first, from their places' tables.
+
+    Raises ``InvalidValueError`` for what is no place, none, or more than ``MOST_BESIDE``.
+    """
+    if not isinstance(rows, list | tuple) or not 1 <= len(rows) <= MOST_BESIDE:
+        raise InvalidValueError(
+            f"also_at must be a list of 1 to {MOST_BESIDE} places with x_m, y_m, yaw_deg, "
+            f"got {rows!r:.80}"
+        )
+    places = [shaped(f"also_at[{k}]", row, Place) for k, row in enumerate(rows)]
+    return [np.array([at.x_m, at.y_m, math.radians(at.yaw_deg)]) for at in places]
+
+
+class Mount(Place, frozen=True):
+    """Where its scanner is."""
+
     height_m: Annotated[float, Meta(ge=0.05, le=1.0)] = SCAN_HEIGHT
 
 

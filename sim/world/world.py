@@ -179,8 +179,8 @@ class World:
         """The share of what is out of sight that is put elsewhere."""
         return 0.0 if self._rearranging is None else self._rearranging.share
 
-    def rearrange(self, spec: LaserSpec, *, at_once: bool = False) -> list[Rearrangement]:
-        """Between two scans: change what that scanner cannot see now.
+    def rearrange(self, *specs: LaserSpec, at_once: bool = False) -> list[Rearrangement]:
+        """Between two scans: change what none of these scanners can see now.
 
         Every ``sim.actors.rearranging.PERIOD_S``; ``at_once``: whenever it is called.
         """
@@ -191,7 +191,7 @@ class World:
         poses, busy = self.mover_poses(), np.zeros(len(self.mover_names), dtype=np.bool_)
         busy[self.people.in_use(self.bodies)] = True
         busy |= self.bodies.any_at(self._pinned.at)
-        done = self._rearranging.rearrange(self.time_ns * 1e-9, spec, poses, busy)
+        done = self._rearranging.rearrange(self.time_ns * 1e-9, specs, poses, busy)
         rows = sorted({self.mover_names.index(event.name) for event in done})
         if rows:
             self.bodies.put(self.data, rows, poses[rows])

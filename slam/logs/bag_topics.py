@@ -262,7 +262,7 @@ def choose(bag: Bag, asked: Asked, *, truth: str | None, labels: bool) -> tuple[
         truth=truths[0] if truths else None,
         turns=there(f"{wanted}_turn", SCAN),
         increment=None,
-        labels=there(LABELS, CLOUD) if labels else None,
+        labels=there(f"{LABELS}{wanted}", CLOUD) or there(LABELS, CLOUD) if labels else None,
         transforms=_transforms(bag, wanted),
         began=there(BEGAN, TIME),
         frame=frame,

@@ -1,7 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Several scanners of one robot as one stream: each frame has the scan of one of them."""
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Iterable, Iterator, Sequence
 from dataclasses import replace
 from heapq import merge
 from itertools import repeat
@@ -39,10 +39,20 @@ def together(streams: Sequence[Stream]) -> Stream:
 
 
 def _merged(streams: Sequence[Stream], measured: bool) -> Iterator[Frame]:
+    numbered = (zip(stream, repeat(k)) for k, stream in enumerate(streams))
+    return _in_turn(merge(*numbered, key=lambda one: one[0].stamp_ns), measured)
+
+
+def one_by_one(frames: Iterable[Sequence[Frame]]) -> Iterator[Frame]:
+    """The same of frames of all scanners at one time, and those of the next."""
+    numbered = ((frame, k) for several in frames for k, frame in enumerate(several))
+    return _in_turn(numbered, measured=True)
+
+
+def _in_turn(numbered: Iterable[tuple[Frame, int]], measured: bool) -> Iterator[Frame]:
     before: Frame | None = None
     own_ns: dict[int, int] = {}  # the stamp before, by stream
-    numbered = (zip(stream, repeat(k)) for k, stream in enumerate(streams))
-    for frame, k in merge(*numbered, key=lambda one: one[0].stamp_ns):
+    for frame, k in numbered:
         since_ns, own_ns[k] = own_ns.get(k), frame.stamp_ns
         if before is None and k:
             continue
@@ -56,6 +66,8 @@ def _after(before: Frame, frame: Frame, since_ns: int | None, measured: bool) ->
     measured  whether there is odometry
     since_ns  the stamp that its covariance begins at, which grows with time
     """
+    if measured and since_ns == before.stamp_ns:
+        return frame
     stamp_ns, odometry, scan = max(frame.stamp_ns, before.stamp_ns + 1), frame.odometry, frame.scan
     if not measured:
         odometry = standing(stamp_ns, before.stamp_ns)

@@ -2,7 +2,8 @@
 """Frames as the messages of their topics: what a bag holds and what goes over the network."""
 
 import math
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
+from dataclasses import replace
 from typing import Any, NamedTuple
 
 import numpy as np
@@ -108,10 +109,48 @@ class _Truth:
         return self._pose(stamp_ns, T_world_robot), links
 
 
-class FrameMessages:
-    """The messages of frames of one scanner, frame by frame.
+def place_of(number: int) -> str:
+    """What topics and the frame of that scanner of a robot end in: the first, 0, in nothing."""
+    return f"_{number + 1}" if number else ""
 
-    height_m  of the scanner, for /tf_static
+
+def scan_topics(number: int) -> tuple[Topic, ...]:
+    """``SCANS`` of that scanner of a robot."""
+    return tuple(
+        replace(topic, name=topic.name.replace("/scan", f"/scan{place_of(number)}"))
+        for topic in SCANS
+    )
+
+
+class _Scans:
+    """The scans of one scanner, whole and turn by turn."""
+
+    def __init__(self, spec: LaserSpec, number: int, *, intensities: bool) -> None:
+        self.spec, turns = spec, ros.turns_of(spec)
+        turn_s = ros.turn_time_s(spec, turns)
+        whole, turn = (topic.name for topic in scan_topics(number))
+        parts = [(whole, ros.Part(turns * turn_s, 0, 1))]
+        parts += [(turn, ros.Part(turn_s, k, turns)) for k in range(turns)]
+        frame = ros.LASER + place_of(number)
+        self._messages = [
+            (topic, ros.ScanMessage(spec, part, frame=frame, intensities=intensities))
+            for topic, part in parts
+        ]
+
+    def __call__(self, frame: Frame) -> Iterator[Message]:
+        """Raises ``InvalidValueError`` for a frame without a scan or of another scanner."""
+        scan = frame.scan
+        if scan is None or (scan.spec is not self.spec and scan.spec != self.spec):
+            raise InvalidValueError("messages are of one scanner: this frame has another one")
+        for topic, message in self._messages:
+            yield Message(topic, *message(scan))
+
+
+class FrameMessages:
+    """The messages of frames of one robot, frame by frame.
+
+    spec      of its scanner; ``others`` of those beside it
+    height_m  of the scanners, for /tf_static
     static_map  what never moves, for /map
     intensities  whether scans have them
     """
@@ -120,21 +159,17 @@ class FrameMessages:
         self,
         spec: LaserSpec,
         *,
+        others: Sequence[LaserSpec] = (),
         height_m: float = 0.0,
         static_map: Raster | None = None,
         intensities: bool = False,
     ) -> None:
-        self.spec, turns = spec, ros.turns_of(spec)
-        turn_s = ros.turn_time_s(spec, turns)
-        whole = {"scan_time": turns * turn_s, "first": 0, "stride": 1}
-        parts = [{"scan_time": turn_s, "first": k, "stride": turns} for k in range(turns)]
+        self.spec, self._specs = spec, (spec, *others)
         self._scans = [
-            (topic, ros.ScanMessage(spec, intensities=intensities, **part))  # type: ignore[arg-type]
-            for topic, part in [("/scan", whole), *(("/scan_turn", part) for part in parts)]
+            _Scans(one, number, intensities=intensities) for number, one in enumerate(self._specs)
         ]
-        self._mount = ros.TransformMessage(
-            (ros.FOOTPRINT, ros.ROBOT, 0.0), (ros.ROBOT, ros.LASER, height_m)
-        )
+        lasers = [(ros.ROBOT, ros.LASER + place_of(k), height_m) for k in range(len(self._specs))]
+        self._mount = ros.TransformMessage((ros.FOOTPRINT, ros.ROBOT, 0.0), *lasers)
         self._wheels, self._truth, self._clock = _Wheels(), _Truth(), ros.ClockMessage()
         self._map = None if static_map is None else ros.MapMessage(static_map)
 
@@ -142,7 +177,8 @@ class FrameMessages:
         """What is sent once, before the first frame."""
         stamp_ns = frame.stamp_ns
         yield Message(BEGAN, stamp_ns, ros.BeganMessage()(stamp_ns))
-        links = self._mount(stamp_ns, se2.IDENTITY, self.spec.T_robot_laser)
+        mounts = [spec.T_robot_laser for spec in self._specs]
+        links = self._mount(stamp_ns, se2.IDENTITY, *mounts)
         yield Message("/tf_static", stamp_ns, links)
         if self._map is not None:
             yield Message("/map", stamp_ns, self._map(stamp_ns))
@@ -163,13 +199,10 @@ class FrameMessages:
             yield Message("/ground_truth/pose", stamp_ns, truth)
             yield Message("/ground_truth/tf", stamp_ns, links)
 
-    def scans(self, frame: Frame) -> Iterator[Message]:
-        """Its scan, whole and turn by turn.
+    def scans(self, *frames: Frame) -> Iterator[Message]:
+        """The scans of all scanners, frames in their order, whole and turn by turn.
 
         Raises ``InvalidValueError`` for a frame without a scan or of another scanner.
         """
-        scan = frame.scan
-        if scan is None or (scan.spec is not self.spec and scan.spec != self.spec):
-            raise InvalidValueError("messages are of one scanner: this frame has another one")
-        for topic, message in self._scans:
-            yield Message(topic, *message(scan))
+        for scans, frame in zip(self._scans, frames, strict=True):
+            yield from scans(frame)

@@ -12,6 +12,7 @@ neighbours are a mirror turn apart. Hence ``/scan_turn``.
 """
 
 import math
+from typing import NamedTuple
 
 import numpy as np
 
@@ -139,8 +140,16 @@ def turn_time_s(spec: LaserSpec, turns: int) -> float:
     return turn
 
 
+class Part(NamedTuple):
+    """Every ``stride``-th beam of a scan from ``first`` on; ``scan_time`` s, of its message."""
+
+    scan_time: float
+    first: int
+    stride: int
+
+
 class ScanMessage:
-    """sensor_msgs/LaserScan of every ``stride``-th beam from ``first`` on, in order of time.
+    """sensor_msgs/LaserScan of a part of a scan, in order of time.
 
     Of a scanner whose mirror turns clockwise, beams and ``angle_increment`` run that way.
     """
@@ -148,8 +157,9 @@ class ScanMessage:
     KIND = "sensor_msgs/msg/LaserScan"
 
     def __init__(
-        self, spec: LaserSpec, *, scan_time: float, first: int, stride: int, intensities: bool
+        self, spec: LaserSpec, part: Part, *, frame: str = LASER, intensities: bool = False
     ) -> None:
+        scan_time, first, stride = part
         marks, beams = Marks(), slice(first, None, stride)
         increment, angles, offsets = (
             stride * spec.angle_increment,
@@ -162,7 +172,7 @@ class ScanMessage:
         ranges, remissions = marks(n, np.float32), marks(n if intensities else 0, np.float32)
         prototype = message(
             self.KIND,
-            header=header(LASER),
+            header=header(frame),
             angle_min=start,
             angle_max=start + (n - 1) * increment,
             angle_increment=increment,

@@ -7,7 +7,7 @@ are linear between physics steps. A scan may begin and end between two steps
 """
 
 import math
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from fractions import Fraction
 from typing import Any
 
@@ -23,7 +23,7 @@ from sim.sensors.lidar.schedule import Window, most_notes, schedule
 from sim.sensors.lidar.surfaces import geom_reflectivity, glass_geoms, polished_geoms
 from slam import se2
 from slam.errors import InvalidValueError
-from slam.frames import Float
+from slam.frames import Float, LaserSpec
 
 STEPS_PER_S = 300  # physics steps between which poses are noted
 
@@ -48,7 +48,8 @@ class LaserScanner:
     Attributes: ``config``; ``scanner``, the model that it gives; ``spec``; ``phase``, the part of a
     physics step by which the next scan begins before the present one, 0 where scans last whole
     steps; ``carried``, whether the laser was moved by hand since the scan before: then the part of
-    a scan that lies before the present is as if it had stood here.
+    a scan that lies before the present is as if it had stood here; ``others``, the specs of the
+    scanners ``beside`` it, and ``seen_by_others``, their scans.
     """
 
     def __init__(
@@ -81,10 +82,13 @@ class LaserScanner:
         ids = self.caster.ids
         polished = polished_geoms(model)[ids] & scanner.bounce
         bodies = model.geom_bodyid[ids].astype(np.int64)
-        surface = (geom_reflectivity(model)[ids], polished, ids, bodies)
+        self._surface = (geom_reflectivity(model)[ids], polished, ids, bodies)
         self._signal = SignalModel(
-            scanner, surface, np.random.default_rng(0) if rng is None else rng
+            scanner, self._surface, np.random.default_rng(0) if rng is None else rng
         )
+        self.others: tuple[LaserSpec, ...] = ()
+        self.seen_by_others: list[ScanResult] = []
+        self._signals_of_others: list[SignalModel] = []
         self._polished = polished
         bounces = scanner.bounce and (self.caster.layers > 1 or bool(polished.any()))
         room = self.spec.n_beams if bounces else 0
@@ -100,7 +104,26 @@ class LaserScanner:
     @property
     def streams(self) -> tuple[np.random.Generator, ...]:
         """The random streams, for who saves and restores the state of a run."""
-        return self._signal.streams
+        signals = (self._signal, *self._signals_of_others)
+        return tuple(stream for signal in signals for stream in signal.streams)
+
+    def beside(self, places: Sequence[Float], seeds: np.random.SeedSequence) -> None:
+        """More scanners of this model, elsewhere on the robot at this height.
+
+        All turn together: what stood where when, they take from the notes of this one, so they
+        change neither its scans nor the world. Raises ``InvalidValueError`` for a place that is
+        taken: scans are told apart by it.
+        """
+        for T_robot_laser, own in zip(places, seeds.spawn(len(places)), strict=True):
+            spec, rng = self.scanner.spec(T_robot_laser), np.random.default_rng(own)
+            if spec.mount in [one.mount for one in (self.spec, *self.others)]:
+                x, y, yaw = spec.mount
+                raise InvalidValueError(
+                    f"two scanners of a robot are at ({x:g} m, {y:g} m, {math.degrees(yaw):g} deg)"
+                    ": place each of them elsewhere"
+                )
+            self.others += (spec,)
+            self._signals_of_others.append(SignalModel(self.scanner, self._surface, rng))
 
     def observe(self, advance: Callable[[], None], data: mujoco.MjData) -> ScanResult:
         """Run one scan: calls of ``advance``, each one physics step of 1/300 s.
@@ -129,18 +152,35 @@ class LaserScanner:
     def finish(self) -> ScanResult:
         """The scan that was begun, once the steps of its ``window`` have passed."""
         window = self.window
+        self.seen_by_others = self._beside()
         self.caster.cast(window.plan)
         if not window.repeats:
             self.phase = window.next
             self._before, self._after = self.caster.last_notes() if self.phase else (None, None)
+        return self._received(self._signal)
+
+    def _received(self, signal: SignalModel) -> ScanResult:
         if self._mirrored[0].size:
             self.caster.mirror(self._polished, self._mirrored)
-        return self._signal.scan(self.caster.hits, self._mirrored)
+        return signal.scan(self.caster.hits, self._mirrored)
+
+    def _beside(self) -> list[ScanResult]:
+        """The scans of the others, from this one's notes."""
+        own, scans = self.caster.lasers.copy(), []
+        for spec, signal in zip(self.others, self._signals_of_others, strict=True):
+            T_laser_other = se2.between(self.spec.T_robot_laser, spec.T_robot_laser)
+            for slot, T_world_laser in enumerate(own):
+                self.caster.lasers[slot] = se2.compose(T_world_laser, T_laser_other)
+            self.caster.cast(self.window.plan)
+            scans.append(self._received(signal))
+        self.caster.lasers[:] = own
+        return scans
 
     def blink(self) -> bool:
         """Leave out the scan that was begun, with its draws; False where the next one needs it."""
         if self.window.repeats:
-            self._signal.blink(self.spec.n_beams)
+            for signal in (self._signal, *self._signals_of_others):
+                signal.blink(self.spec.n_beams)
         return self.window.repeats
 
     def skip(self) -> None:

@@ -7,9 +7,13 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.film.footage import of_log
+from scripts.debugger.recording import case_of
+from scripts.film.footage import of_log, of_scene, open_run
+from scripts.options import Tour
 from scripts.single_run import log_words
-from slam.errors import InvalidValueError
+from scripts.single_run.run import on_scene
+from scripts.single_run.session import Outputs
+from slam.errors import InvalidValueError, LogFormatError
 from slam.logs.bag_topics import Asked
 from tests.slam.logs.two_scanners import bag
 
@@ -47,3 +51,21 @@ def test_what_cannot_be_is_refused_with_the_cure(tmp_path: Path) -> None:
     text.write_text("")
     with pytest.raises(InvalidValueError, match="--scan and --odometry name topics"):
         of_log(text, asked=topics)
+
+
+def test_a_simulated_robot_has_two_and_its_run_is_shown_again(tmp_path: Path) -> None:
+    settings = Tour(seconds=2.0, also_at=["-0.2,0,180"]).settings("arena")
+    assert settings["also_at"] == [{"x_m": -0.2, "y_m": 0.0, "yaw_deg": 180.0}]
+    assert "also_at" not in Tour().settings("arena")
+    with pytest.raises(InvalidValueError, match="--also-at must be x,y,yaw_deg in m, m, deg"):
+        Tour(also_at=["0,0"]).settings("arena")
+    run = tmp_path / "run"
+    on_scene(["shunting", "kiss-icp"], settings, Outputs(folder=run, command="run", film=False))
+    with of_scene(settings, view=None) as made, open_run(run, view=None) as again:
+        frames = list(made.stream)
+        assert len(frames) == made.stream.length == again.stream.length
+        assert frames == list(again.stream)
+    rows = (run / "trajectory_kiss-icp.tum").read_text().splitlines()
+    assert len(rows) == len(frames)
+    with pytest.raises(LogFormatError, match="take one without --also-at"):
+        case_of(run, None, 1)
