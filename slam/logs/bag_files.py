@@ -13,7 +13,7 @@ import shutil
 import sqlite3
 import struct
 from collections.abc import Callable, Collection, Iterator
-from contextlib import ExitStack, closing
+from contextlib import ExitStack, closing, suppress
 from pathlib import Path, PurePath
 from tempfile import TemporaryDirectory
 from typing import Any, BinaryIO
@@ -33,12 +33,13 @@ from slam.logs.text import IMPOSSIBLE
 Record = tuple[str, str, int, bytes]  # topic, type, log time ns, message
 Wanted = Collection[str] | None  # topics; None: all
 METADATA = "metadata.yaml"
-MAX_METADATA_BYTES = 1 << 24
+MAX_METADATA_BYTES = 1 << 22  # of 2000 topics with their QoS; half a minute to read
 CURES = {".mcap": "mcap recover", ".bag": "rosbag reindex", ".db3": "sqlite3 FILE .recover"}
 _MCAP, _SQLITE, _ROS1 = b"\x89MCAP0\r\n", b"SQLite format 3\0", b"#ROSBAG V2.0\n"
 _MCAP_FOOTER = b"\x02\x14" + bytes(7)
 _MCAP_END_BYTES = 37  # footer and magic
 _SCHEMA, _CHANNEL, _MESSAGE, _CHUNK = 3, 4, 5, 6  # records of MCAP that are read
+IN_CHUNK = "a chunk in a chunk"  # each may unpack to the most that one may
 _ENDS = (2, 15)  # footer, end of the data
 _SIDECARS = ("-wal", "-journal")  # what SQLite has not yet, or half, put into the file
 
@@ -86,16 +87,23 @@ def _stored(folder: Path) -> list[Path]:
 def _metadata(path: Path) -> tuple[list[str], dict[str, int]]:
     """Names of files, and messages by topic; nothing of what is damaged: the files say it too."""
     try:
-        said = YAML(typ="safe", pure=True).load(text_of(path, MAX_METADATA_BYTES))
-        said = said["rosbag2_bagfile_information"]
-        names = [PurePath(name).name for name in said["relative_file_paths"]]
+        # never built: keys that merge others would make a few lines more than any memory
+        root = YAML(typ="base", pure=True).compose(text_of(path, MAX_METADATA_BYTES))
+        said = _fields(_fields(root)["rosbag2_bagfile_information"])
+        names = [PurePath(name.value).name for name in said["relative_file_paths"].value]
+        topics = [_fields(topic) for topic in said["topics_with_message_count"].value]
         counts = {
-            str(topic["topic_metadata"]["name"]): int(topic["message_count"])
-            for topic in said["topics_with_message_count"]
+            str(_fields(topic["topic_metadata"])["name"].value): int(topic["message_count"].value)
+            for topic in topics
         }
-    except (YAMLError, RecursionError, LogFormatError, *IMPOSSIBLE):
+    except (YAMLError, AssertionError, RecursionError, LogFormatError, *IMPOSSIBLE):
         return [], {}
     return names, counts
+
+
+def _fields(node: Any) -> dict[str, Any]:
+    """The nodes of a mapping of YAML, by their keys."""
+    return {key.value: value for key, value in node.value}
 
 
 def settled(path: Path, stack: ExitStack) -> tuple[Path, str]:
@@ -155,6 +163,23 @@ def can_be_cut(path: Path) -> bool:
         return head == _SQLITE
 
 
+def check_tables(path: Path) -> None:
+    """``ValueError`` for a file of SQLite that computes what it says: it may do so without end."""
+    if suffix_of(path) != ".db3":
+        return
+    with closing(_opened(path)) as database, suppress(sqlite3.DatabaseError):  # the reader says it
+        for kind, name, page in database.execute("SELECT type, name, rootpage FROM sqlite_master"):
+            if kind not in ("table", "view"):
+                continue
+            columns = database.execute("SELECT hidden FROM pragma_table_xinfo(?)", [name])
+            if kind == "view" or not page or any(hidden for (hidden,) in columns):
+                raise ValueError(f"{name} is not a table of messages, but computed")
+
+
+def _opened(path: Path) -> sqlite3.Connection:
+    return sqlite3.connect(f"file:{quote(str(path.resolve()))}?immutable=1", uri=True)
+
+
 def records(path: Path, wanted: Wanted = None) -> Iterator[Record]:
     """The messages in the order of the file; ``CutShortError`` where a record is not whole."""
     walk: Callable[[Path, Wanted], Iterator[Record]] = {
@@ -183,7 +208,7 @@ def _mcap(path: Path, wanted: Wanted) -> Iterator[Record]:
                 channels[number] = storage_mcap.read_string(rest), schemas.get(schema, "")
 
 
-def _mcap_records(file: BinaryIO, end: int) -> Iterator[tuple[int, bytes]]:
+def _mcap_records(file: BinaryIO, end: int, depth: int = 0) -> Iterator[tuple[int, bytes]]:
     """Schemas, channels and messages, those in chunks too."""
     while head := file.read(9):
         if len(head) < 9:
@@ -194,9 +219,11 @@ def _mcap_records(file: BinaryIO, end: int) -> Iterator[tuple[int, bytes]]:
         whole = size <= end - file.tell()
         if kind in (_SCHEMA, _CHANNEL, _MESSAGE, _CHUNK):
             data = file.read(min(size, end))
+            if kind == _CHUNK and depth:
+                raise ValueError(IN_CHUNK)
             if kind == _CHUNK:
                 inside = _mcap_chunk(data, whole)
-                yield from _mcap_records(io.BytesIO(inside), len(inside))
+                yield from _mcap_records(io.BytesIO(inside), len(inside), depth + 1)
             elif whole:
                 yield kind, data
         elif whole:
@@ -218,8 +245,7 @@ def _mcap_chunk(data: bytes, whole: bool) -> bytes:
 
 
 def _sqlite(path: Path, wanted: Wanted) -> Iterator[Record]:
-    name = f"file:{quote(str(path.resolve()))}?immutable=1"
-    with closing(sqlite3.connect(name, uri=True)) as database:
+    with closing(_opened(path)) as database:
         try:
             database.execute("PRAGMA writable_schema=ON")  # else a file that was cut is not opened
             topics = {
@@ -253,7 +279,7 @@ def _ros1(path: Path, wanted: Wanted) -> Iterator[Record]:
                 connections[number] = topic, normalize_msgtype(said.get_string("type"))
 
 
-def _ros1_records(file: BinaryIO, end: int) -> Iterator[tuple[Any, bytes]]:
+def _ros1_records(file: BinaryIO, end: int, depth: int = 0) -> Iterator[tuple[Any, bytes]]:
     """Connections and messages, those in chunks too.
 
     A chunk that was not finished says that it has 0 bytes: what is in it comes right after it.
@@ -270,6 +296,8 @@ def _ros1_records(file: BinaryIO, end: int) -> Iterator[tuple[Any, bytes]]:
             file.seek(size, os.SEEK_CUR)
         else:
             data = file.read(size)
+            if kind == kinds.CHUNK and depth:
+                raise ValueError(IN_CHUNK)
             if kind == kinds.CHUNK:
                 compression = header.get_string("compression")
                 inside = (
@@ -277,7 +305,7 @@ def _ros1_records(file: BinaryIO, end: int) -> Iterator[tuple[Any, bytes]]:
                     if whole and size
                     else unpacking.beginning(data, compression)
                 )
-                yield from _ros1_records(io.BytesIO(inside), len(inside))
+                yield from _ros1_records(io.BytesIO(inside), len(inside), depth + 1)
             elif whole:
                 yield header, data
         if not whole:

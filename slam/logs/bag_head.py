@@ -52,6 +52,7 @@ class Head:
         self.children = defaultdict[str, Counter[str]](Counter)
         self.links: dict[Edge, Any] = {}
         self._tried_ns = -(1 << 62)
+        self._tried: Any = None
         self._known = False
         self._read()
 
@@ -83,20 +84,31 @@ class Head:
         """Whether the way to the scanner is known, from odometry of a topic or of /tf."""
         if not self._known and not 0 <= log_ns - self._tried_ns < TRY_NS:
             self._tried_ns = log_ns
+            usual = (max(c, key=lambda f: c[f], default="") for c in self._counts())
+            now = len(self.links), sum(map(len, self._counts())), *usual
+            if now == self._tried:  # it says what it said
+                return not self._topics.transforms
+            self._tried = now
             topics = self.decided()
             self._known = topics.odometry is not None and self.mount(topics) is not None
         return self._known or not self._topics.transforms
+
+    def _counts(self) -> list[Counter[str]]:
+        return [self.count, *self.children.values()]
 
     def decided(self) -> Topics:
         """The topics with frames and odometry: of the scan's namespace, joined to it by /tf."""
         topics = self._topics
         frames = self.count if topics.frame == "" else {topics.frame: self.count[topics.frame]}
         frame = max(frames, key=lambda f: frames[f], default="")
+        ends = {end for edge in self.links for end in edge}
         found: list[tuple[tuple[int, ...], str, str, str]] = []
         for topic in self._drives:
             for child, count in self.children[topic].items():
                 name = f"{topic}:{child}" if len(self.children[topic]) > 1 else topic
-                joined = child == frame or mounting(self.links, child, frame) is not None
+                joined = child == frame or (
+                    {child, frame} <= ends and mounting(self.links, child, frame) is not None
+                )
                 rank = (-shared(topic, topics.scan), not joined, self._drives.index(topic), -count)
                 if topics.child in ("", child) and (
                     topics.odometry or not of_another(child, frame)

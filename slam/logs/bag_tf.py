@@ -64,19 +64,39 @@ def way(links: Links, start: str, goal: str, *, up: bool = True, fixed: bool = F
     up     links may be walked from child to parent
     fixed  the way may lead through frames that do not ride on the robot; there, two robots meet
     """
+    return _steps(_reached(_neighbours(links, up), start, goal, shut=up and not fixed), start, goal)
+
+
+Neighbours = Mapping[str, Sequence[tuple[str, Step]]]
+Reached = Mapping[str, tuple[str, Step]]
+
+
+def _neighbours(links: Links, up: bool = True) -> Neighbours:
     near = defaultdict[str, list[tuple[str, Step]]](list)
     for parent, child in links:
         near[parent].append((child, ((parent, child), False)))
         if up:
             near[child].append((parent, ((parent, child), True)))
+    return near
+
+
+def _reached(near: Neighbours, start: str, goal: str = "", *, shut: bool = True) -> Reached:
+    """Of each frame that is reached, the nearest first: from which, and by which step.
+
+    shut  those that do not ride on the robot are closed, but for ``goal``
+    """
     came: dict[str, tuple[str, Step]] = {}
     rim = [start]
     for here in rim:
-        for there, step in near[here]:
-            shut = up and not fixed and there != goal and stands(there)
-            if there not in came and there != start and not shut:
-                came[there] = here, step
-                rim.append(there)
+        for there, step in near.get(here, ()):
+            if there in came or there == start or (shut and there != goal and stands(there)):
+                continue
+            came[there] = here, step
+            rim.append(there)
+    return came
+
+
+def _steps(came: Reached, start: str, goal: str) -> list[Step]:
     if goal not in came:
         return []
     steps = []
@@ -107,14 +127,13 @@ def odometry_way(links: Links, laser: str, frame: str = "") -> list[Step]:
     A way that goes on to the scanner is preferred, then the shortest. [] without one.
     """
     starts = {f for edge in links for f in edge if "odom" in _last(f)} if not frame else {frame}
-    found = []
-    for odom in starts:
-        ahead = way(links, odom, laser)
-        goals = [] if ahead else [base for base in bases(links, laser) if base != odom]
-        steps = ahead or min(
-            filter(None, (way(links, odom, g) for g in goals)), key=len, default=[]
-        )
-        if steps and not of_another(odom, laser):
+    found, near, goals = [], _neighbours(links), bases(links, laser)
+    for odom in (start for start in starts if not of_another(start, laser)):
+        came = _reached(near, odom, laser)
+        ahead = _steps(came, odom, laser)
+        ways = [] if ahead else [_steps(came, odom, goal) for goal in goals if goal in came]
+        steps = ahead or min(ways, key=len, default=[])
+        if steps:
             rank = (not ahead, _last(odom) != "odom", len(steps), odom)
             found.append((rank, _to_base(steps)))
     return min(found)[1] if found else []

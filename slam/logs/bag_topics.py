@@ -128,6 +128,7 @@ class Bag:
         copy, wrong = bag_files.settled(file, stack)
         if wrong:
             self._note(LOST, wrong)
+        bag_files.check_tables(copy)
         return copy
 
     def _index(self, file: Path) -> dict[str, tuple[str, int]]:

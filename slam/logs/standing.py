@@ -27,6 +27,8 @@ class Standing:
     def pose(self, pose: Sequence[float]) -> None:
         """x m, y m, theta rad."""
         for k, value in enumerate(pose):
+            if math.isnan(value):  # which no comparison would notice
+                self._low[k], self._high[k] = -math.inf, math.inf
             self._low[k] = min(self._low[k], value)
             self._high[k] = max(self._high[k], value)
 

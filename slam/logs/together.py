@@ -17,7 +17,7 @@ def together(streams: Sequence[Stream]) -> Stream:
     It begins with a scan of the first, which is the scanner of who takes but one
     (``slam.one_scanner``); ``metadata.others`` has the rest. Of scans at one time, each comes 1 ns
     after the one before it. Raises ``InvalidValueError`` where one of several is not known to be
-    mounted anywhere: their scans would contradict each other.
+    mounted anywhere: their scans would contradict each other; and where two are the same scanner.
     """
     first, *others = (stream.metadata for stream in streams)
     if not others:
@@ -29,6 +29,11 @@ def together(streams: Sequence[Stream]) -> Stream:
                 "is mounted, and there are several: give --laser x,y,yaw_deg once for each --scan, "
                 "in their order"
             )
+    names = [one.extra["scan"] for one in (first, *others) if "scan" in one.extra]
+    if twice := [name for k, name in enumerate(names) if name in names[:k]]:
+        raise InvalidValueError(
+            f"{first.extra.get('file')}: the scans of {twice[0]} are named twice"
+        )
     measured = all(one.odometry for one in (first, *others))
     lengths = [stream.length for stream in streams]
     return Stream(

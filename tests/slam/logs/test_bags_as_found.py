@@ -3,6 +3,7 @@
 
 import math
 import sqlite3
+import struct
 from pathlib import Path
 from typing import Any
 
@@ -333,3 +334,60 @@ def test_a_text_log_whose_odometry_stands_still(tmp_path, carmen_text, driven, c
     assert "stands still while scans move" in caplog.text
     with pytest.raises(LogFormatError, match="stands still"):
         open_log(tmp_path / "a.log", strict=True)
+
+
+ENDLESS = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c)"
+
+
+@pytest.mark.parametrize(
+    "made",
+    [
+        f"VIEW messages AS {ENDLESS} SELECT x id, 1 topic_id, x timestamp, x'00' data FROM c",
+        "TABLE messages(id INTEGER, topic_id, timestamp, data AS (zeroblob(900000000)))",
+    ],
+)
+def test_sqlite_that_computes_its_messages_is_refused(tmp_path, driven, made):
+    bag = bags.write_ros2(tmp_path / "a", recorded(driven[:5]))
+    with sqlite3.connect(next(bag.glob("*.db3"))) as database:
+        database.execute("ALTER TABLE messages RENAME TO kept")
+        database.execute(f"CREATE {made}")
+    with pytest.raises(LogFormatError, match="messages is not a table of messages, but computed"):
+        read_bag(bag)
+
+
+def test_metadata_whose_keys_merge_without_end_is_none(tmp_path, driven):
+    bag = bags.write_ros2(tmp_path / "a", recorded(driven[:5]))
+    lines = ["a0: &a0 {x: 1}"]
+    lines += [f"a{k}: &a{k} {{<<: [{', '.join([f'*a{k - 1}'] * 10)}]}}" for k in range(1, 12)]
+    (bag / "metadata.yaml").write_text("\n".join(lines))
+    assert len(list(read_bag(bag))) == 5
+
+
+def test_odometry_that_is_no_number_is_not_one_that_stands_still(tmp_path, driven):
+    rows = recorded(driven, odometry=lambda k, pose: (math.nan, 0.0, 0.0))
+    with pytest.raises(LogFormatError, match=r"topic /odom, message 1: pose\.position"):
+        list(read_bag(bags.write_ros2(tmp_path / "a", rows)))
+
+
+def test_a_chunk_in_a_chunk_is_refused(tmp_path):
+    def record(kind: int, data: bytes) -> bytes:
+        return struct.pack("<BQ", kind, len(data)) + data
+
+    body = record(5, bytes(22))
+    for _ in range(2):
+        head = struct.pack("<QQQIIQ", 0, 0, len(body), 0, 0, len(body))
+        body = record(6, head + body)
+    file = tmp_path / "a.mcap"
+    file.write_bytes(b"\x89MCAP0\r\n" + record(1, b"\4\0\0\0ros2" + bytes(4)) + body + b"\x05")
+    with pytest.raises(LogFormatError, match="a chunk in a chunk"):
+        read_bag(file)
+
+
+def test_many_robots_on_tf_are_looked_through_once(tmp_path, driven):
+    make = bags.Maker()
+    rows = [row for row in recorded(driven[:40]) if row[0] == "/scan"]
+    for k in range(400):
+        turn = (0.0, 0.0, 0.0, 1.0)
+        rows.append(make.transform(START, f"odom{k}", f"b{k}/base_link", (0.0, 0.0, 0.0), turn))
+    rows.sort(key=lambda row: row[2])
+    assert len(list(read_bag(bags.write_ros2(tmp_path / "a", rows)))) == 40

@@ -12,6 +12,7 @@ import pytest
 
 import tests.slam.logs.foreign_bags as bags
 from slam import create, se2
+from slam.errors import InvalidValueError
 from slam.frames import Frame, Stream, StreamMetadata
 from slam.logs import read_bag
 from slam.logs.together import together
@@ -89,3 +90,9 @@ def test_odometry_that_one_of_them_has_not_is_none() -> None:
     both = together([of(made[::2], 0.0), of(made[1::2], 0.3, odometry=False)])
     assert not both.metadata.odometry
     assert not any(frame.odometry.T_odom_robot.any() for frame in list(both)[1:])
+
+
+def test_one_scanner_that_is_named_twice_is_refused(tmp_path: Path) -> None:
+    path = bag(tmp_path / "two")
+    with pytest.raises(InvalidValueError, match="the scans of /front are named twice"):
+        together([read_bag(path, scan="/front")] * 2)
