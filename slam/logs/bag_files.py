@@ -79,6 +79,9 @@ def files_of(path: Path) -> tuple[list[Path], dict[str, int], list[str]]:
 def _stored(folder: Path) -> list[Path]:
     """The recordings in it, ``a_2`` before ``a_10``."""
     found = [file for file in folder.iterdir() if suffix_of(file) in (".mcap", ".db3")]
+    for file in found:
+        if file.is_symlink() and folder.resolve() not in file.resolve().parents:
+            raise LogFormatError(file, "a link out of its folder: name the recording itself")
     return sorted(found, key=lambda file: [
         (int(part), "") if part.isdigit() else (0, part) for part in re.split(r"(\d+)", file.name)
     ])  # fmt: skip

@@ -339,6 +339,13 @@ def test_a_text_log_whose_odometry_stands_still(tmp_path, carmen_text, driven, c
 ENDLESS = "WITH RECURSIVE c(x) AS (SELECT 1 UNION ALL SELECT x + 1 FROM c)"
 
 
+def test_a_recording_that_is_a_link_out_of_its_folder_is_refused(tmp_path, driven):
+    (tmp_path / "bag").mkdir()
+    (tmp_path / "bag" / "bag_0.mcap").symlink_to(whole_bag(tmp_path, driven, "mcap"))
+    with pytest.raises(LogFormatError, match="a link out of its folder"):
+        read_bag(tmp_path / "bag")
+
+
 @pytest.mark.parametrize(
     "made",
     [
