@@ -15,6 +15,7 @@ from slam.odometry import OdometrySlam
 from slam.one_scanner import OneScanner, for_several
 from slam.oracle import Oracle
 from slam.replay import Replay
+from tests.slam.test_oracle import Watcher
 from tests.world2d import Drive, World2D, arena, frames, laser
 
 FRONT = replace(laser(91), T_robot_laser=np.array([0.3, 0.0, 0.0]))
@@ -22,19 +23,10 @@ REAR = replace(laser(61), T_robot_laser=np.array([-0.3, 0.0, math.pi]))
 DRIVE = Drive((0.0, 0.0, 0.0), ((0.3, 0.4, 2.0),))
 
 
-class Foreign(OdometrySlam):
-    """Somebody's SLAM, which knows nothing of several; odometry that keeps what it was shown."""
+class Foreign(Watcher):
+    """Somebody's SLAM, which knows nothing of several."""
 
     takes_several = False
-    cells_hold = "guesses"
-
-    def __init__(self) -> None:
-        self.seen: list[Frame] = []
-        super().__init__()
-
-    def update(self, frame: Frame) -> Estimate:
-        self.seen.append(frame)
-        return super().update(frame)
 
 
 def stream(*, odometry: bool = True) -> Stream:

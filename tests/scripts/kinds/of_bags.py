@@ -186,7 +186,9 @@ KINDS = [
         partial(_bag, scan=_torn), partial(_read, kept=[k for k in range(N) if k not in (3, 7, 8)]),
     ),
     _kind(
-        "scans that differ in beams, angles or `range_max`", "each is read by its own header",
+        "scans that differ in beams, angles or `range_max`",
+        "each is read by its own header, but for `range_min` and the times of beams: those are of "
+        "the first scan with these beams and angles",
         "scans differ, each is read by its own header: 7 to 9 beams, …",
         partial(_bag, scan=lambda k: {"ranges": [2.0] * (9 - k % 3)}), _own_beams, strict=False,
     ),
