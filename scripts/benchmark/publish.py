@@ -10,7 +10,7 @@ was lost at the top of each track, and the days. The folder of ``scripts.benchma
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -134,7 +134,7 @@ _DAYS = (
 )
 
 
-def blocks(of: Results, aged: Sequence[Row]) -> list[tuple[str, str, str]]:
+def blocks(of: Results, aged: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
     """Every marked place: its page, seen from docs, its name and what stands there.
 
     aged  rows of ``days.read``

@@ -22,7 +22,7 @@ SHARE = re.compile(r"\b(?!95 %)\d+ %")
 TRACK = re.compile("|".join(rf"{t.family}-v\d|`{t.family}`" for t in TRACKS.values()))
 
 
-@pytest.mark.parametrize(("page", "mark", "told"), BLOCKS, ids=lambda word: word[:20])
+@pytest.mark.parametrize(("page", "mark", "told"), BLOCKS, ids=[b[1] for b in BLOCKS])
 def test_a_marked_place_has_what_the_runs_that_ship_give(page: str, mark: str, told: str):
     text = (DOCS / page).read_text()
     assert text == filled(text, mark, told, page), "python -m scripts.benchmark.publish"
