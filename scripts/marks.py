@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Marked places of a Markdown page, which a script fills: ``<!-- name -->`` … ``<!-- /name -->``.
 
-A rendered page does not show the marks. A place of its own lines has each mark on a line of its
-own; a place within a line is within one line, and not at its beginning, where Markdown would take
-all of the line for HTML.
+A rendered page does not show the marks. Each stands on a line of its own.
 
 A page has no long tables: their rows go to CSV files in ``docs/results``, which the page links.
 """
@@ -31,19 +29,13 @@ def table(heads: Sequence[str], rows: Iterable[Sequence[str]], *, left: int = 1)
 
 
 def filled(text: str, name: str, told: str, page: object) -> str:
-    """``text`` with ``told`` at the place ``name``; empty lines round it where it has its own.
+    """``text`` with ``told`` at the place ``name``, empty lines round it.
 
-    Raises ``InvalidValueError`` that names ``page`` where the marks are not there once, are in the
-    wrong order, or a place within a line would get several.
+    Raises ``InvalidValueError`` that names ``page`` where the marks are not there once, or are in
+    the wrong order.
     """
     start, end = _marks(text, name, page)
-    begin = f"<!-- {name} -->"
-    before, after = text[: start + len(begin)], text[end:]
-    if text[start + len(begin)] == "\n":
-        return f"{before}\n\n{told}\n\n{after}"
-    if "\n" in told:
-        raise InvalidValueError(f"{page}: {begin} must stand on a line of its own for {told!r}")
-    return f"{before}{told}{after}"
+    return f"{text[: start + len(f'<!-- {name} -->')]}\n\n{told}\n\n{text[end:]}"
 
 
 def fill_page(page: Path, name: str, told: str, most: int = MOST_CELLS) -> None:

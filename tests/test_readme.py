@@ -2,9 +2,11 @@
 """README and docs do what they say: their Python blocks run, their links lead somewhere."""
 
 import re
+import tomllib
 from pathlib import Path
 
 import pytest
+import yaml
 
 from tests.processes import python
 
@@ -22,6 +24,26 @@ def blocks(page: str) -> list[str]:
 
 def run(*command: str) -> str:
     return str(python(*command).stdout)
+
+
+@pytest.mark.filterwarnings("ignore")
+def test_the_code_of_the_readme_runs_and_prints_what_stands_beside_it(capsys):
+    for block in blocks("../README.md"):
+        exec(block, {})
+        assert capsys.readouterr().out.splitlines() == re.findall(r"^print.*  # (.*)$", block, re.M)
+
+
+def test_the_front_page_of_the_site_has_the_jobs_of_the_readme():
+    (jobs,) = re.findall(r"\| your job .*?\n\n", README, flags=re.DOTALL)
+    assert jobs.replace("](docs/", "](") in (DOCS / "index.md").read_text()
+
+
+def test_the_citation_is_of_this_version():
+    project = tomllib.loads((REPO / "pyproject.toml").read_text())["project"]
+    cited = yaml.safe_load((REPO / "CITATION.cff").read_text())
+    assert {"cff-version", "message", "title", "authors"} < cited.keys()  # what it must have
+    assert (cited["version"], cited["license"]) == (project["version"], project["license"])
+    assert cited["authors"] == project["authors"]
 
 
 @pytest.mark.filterwarnings("ignore")
@@ -54,8 +76,6 @@ def test_slam_needs_no_simulator():
 
 
 def test_every_dependency_is_explained():
-    import tomllib
-
     project = tomllib.loads((REPO / "pyproject.toml").read_text())["project"]
     explained = re.findall(
         r"^\| `([\w.-]+)` \| \w.* \|$", (DOCS / "dependencies.md").read_text(), re.M

@@ -1,15 +1,16 @@
 # SPDX-License-Identifier: Apache-2.0
 """Fill the pages from the runs that ship: ``python -m scripts.benchmark.publish [out/days]``.
 
-docs/benchmark.md gets the tracks, the ranking and the picture, docs/leaderboard.md what was lost at
-the top of each track. The folder of ``scripts.benchmark.days`` goes to ``docs/results``, as
-``days.json`` and ``days.csv``; the section at the end of docs/leaderboard.md is made from it.
+Each number of the benchmark on a page stands between marks, and all of them are filled here: in
+README.md one sentence, in docs/benchmark.md the tracks and the ranking, in docs/leaderboard.md what
+was lost at the top of each track, and the days. The folder of ``scripts.benchmark.days`` goes to
+``docs/results``, as ``days.json`` and ``days.csv``.
 """
 
 import argparse
 import json
 import sys
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -21,7 +22,7 @@ from matplotlib.figure import Figure
 from scripts.benchmark import days
 from scripts.benchmark.board import RANKED_HEADS, Board
 from scripts.benchmark.runs_file import Results, read
-from scripts.benchmark.scores import Row
+from scripts.benchmark.scores import Row, ranking
 from scripts.benchmark.tracks import LEVELS, Track, newest
 from scripts.comparison.tables import write_csv
 from scripts.console import ended
@@ -31,11 +32,13 @@ from scripts.marks import fill_page, table
 from scripts.report.answer import ODOMETRY
 from scripts.result_files import RESULTS, ROOT
 from slam.files import write_text
+from slam.system import OWN
 from slam.variants import ORACLE
 
 DOCS = ROOT / "docs"
 _COUNTS = {True: "yes", False: "no", None: "open"}
-PAGE, BOARD = "benchmark.md", "leaderboard.md"
+FRONT, PAGE, BOARD = "../README.md", "benchmark.md", "leaderboard.md"
+_OURS = ("shunting", "occupancy", "ekf")
 PERCENT = 100.0
 SHORT = 8  # digits of a commit
 APART = 4.2  # percent between two names at the ends of their lines
@@ -87,6 +90,22 @@ def _ranked_runs(board: Board) -> str:
     return f"{one['runs']} runs: {counting} tracks that count, levels {_list(one['levels'])}"
 
 
+def in_a_sentence(of: Results) -> str:
+    """Who is lost in how many of the runs at level 1 that most SLAMs made, where tracks count."""
+    board = board_of(of)
+    counting = (track for track in board.tracks if board.fair[track.name]["counts"])
+    top = {t.name: [r for r in board.runs[t.name] if r["dynamism"] == LEVELS[-1]] for t in counting}
+    ranked = ranking(top, board.subject)
+    lost, runs = {row["slam"]: row["lost_runs"] for row in ranked}, ranked[0]["runs"]
+    public = [n for slam, n in lost.items() if OWN.get(slam, "").startswith("slam.guests.")]
+    ours = ", ".join(f"`{slam}` {lost[slam]}" for slam in _OURS if slam in lost)
+    return (
+        f"Runs lost, of the same {runs} at level 1 of the [benchmark](docs/benchmark.md): {ours}, "
+        f"{len(public)} public SLAMs {min(public)} to {max(public)} each "
+        "([track by track](docs/leaderboard.md))."
+    )
+
+
 def at_the_top(of: Results) -> str:
     """Runs lost at level 1, of how many: a row for each track, a column for each SLAM."""
     board = board_of(of)
@@ -109,6 +128,26 @@ def _list(values: Sequence[float]) -> str:
     return ", ".join(f"{value:g}" for value in values)
 
 
+_DAYS = (
+    "All scores with their intervals: [days.csv](results/days.csv); of each building: "
+    "[days.json](results/days.json)."
+)
+
+
+def blocks(of: Results, aged: Sequence[Mapping[str, Any]]) -> list[tuple[str, str, str]]:
+    """Every marked place: its page, seen from docs, its name and what stands there.
+
+    aged  rows of ``days.read``
+    """
+    return [
+        (FRONT, "benchmark", in_a_sentence(of)),
+        (PAGE, "tracks", tracks_table(list(newest().values()))),
+        (PAGE, "shipped", shipped(of)),
+        (BOARD, "top", at_the_top(of)),
+        (BOARD, "days", f"{days.section(aged, tables=False)}\n\n{_DAYS}"),
+    ]
+
+
 def publish(docs: Path, results: Path, aged: Path | None, commit: str) -> None:
     """Draw and fill; raises ``LogFormatError`` for a folder without scores over days."""
     if aged is not None:
@@ -122,37 +161,17 @@ def publish(docs: Path, results: Path, aged: Path | None, commit: str) -> None:
             head = f'{{\n "command": {command},\n "commit": {json.dumps(commit)},\n'
             text = text.replace("{\n", head, 1)
         write_text(copy, text)
-    of = read()
+    of, rows = read(), days.read(results / days.NAMES[1])
+    write_csv(results / days.NAMES[0], levels(rows), LEVEL_COLUMNS)
     board = board_of(of)
     overall(board.ranking, _ranked_runs(board), docs / "pictures" / "benchmark.png")
-    for page, mark, told in (
-        (PAGE, "tracks", tracks_table(list(newest().values()))),
-        (PAGE, "shipped", shipped(of)),
-        (BOARD, "top", at_the_top(of)),
-    ):
+    for page, mark, told in blocks(of, rows):
         fill_page(docs / page, mark, told, most=len(told))  # the table of the page, however long
-    _publish_days(docs / BOARD, results / days.NAMES[1])
-
-
-_DAYS = (
-    "All scores with their intervals: [days.csv](results/days.csv); of each building: "
-    "[days.json](results/days.json)."
-)
 
 
 def _made_days(told: dict[str, Any]) -> str:
     words = ["python -m scripts.benchmark.days out/days --slam", *told["slams"]]
     return " ".join([*words, "--seeds", str(len(told["seeds"]))])
-
-
-def _publish_days(page: Path, results: Path) -> None:
-    """The section at the end of the leaderboard's page, from the results; none without them."""
-    if not results.exists() or not page.exists():
-        return
-    before, _, _ = page.read_text(encoding="utf-8").partition(f"\n{days.HEADING}\n")
-    rows = days.read(results)
-    write_csv(results.with_suffix(".csv"), levels(rows), LEVEL_COLUMNS)
-    write_text(page, f"{before.rstrip()}\n\n{days.section(rows, tables=False)}\n\n{_DAYS}\n")
 
 
 @ended

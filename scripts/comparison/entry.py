@@ -16,9 +16,8 @@ import numpy as np
 from scripts.comparison.maps import MapJudge
 from scripts.comparison.recording import Recording, load
 from scripts.metrics import table
-from scripts.metrics.judged import Judged, lost_s
+from scripts.metrics.judged import Judged
 from slam.errors import SlamFailedError
-from slam.evaluation import metrics
 from slam.frames import NS_PER_S, Float, Frame
 from slam.guests import Limits, limited
 from slam.oracle import shown
@@ -190,7 +189,7 @@ def scored(
     judged = replace(Judged.of(track, None, final), steady_s=steady_s)
     row: dict[str, Any] = {"scans": len(track.estimates), **_computed(judged), "failure": None}
     online = track.online()
-    lost_at_s = lost_s(metrics.pose_errors(online, truth), truth) if len(online) else None
+    lost_at_s = replace(judged, truth=truth).lost_s if len(online) else None
     outcome = "finished" if lost_at_s is None else "lost"
     if failure is None:
         row |= _computed(replace(judged, truth=truth))

@@ -37,14 +37,6 @@ def in_first_frame(truth: Trajectory) -> Trajectory:
     return Trajectory(stamps_ns=truth.stamps_ns, poses=poses)
 
 
-def lost_s(pairs: metrics.PoseErrors, truth: Trajectory) -> float | None:
-    """Seconds from the start of the truth to the loss (``slam.evaluation.lost``); None for none."""
-    seconds = (pairs.stamps_ns - truth.stamps_ns[0]) / NS_PER_S
-    spared = lost.excused(seconds, pairs.truth[:, :2])
-    distances, headings = (np.where(spared, 0.0, e) for e in (pairs.distances, pairs.errors[:, 2]))
-    return lost.lost_at(seconds, distances, headings)
-
-
 @dataclass(frozen=True, kw_only=True, eq=False)
 class Judged:
     """What a metric may be computed from.
@@ -96,6 +88,21 @@ class Judged:
         """The paper's mean(e), var(e), var(p)."""
         return metrics.error_statistics(self.estimate, self.known)
 
+    @cached_property
+    def lost_s(self) -> float | None:
+        """Seconds from the start to the loss (``slam.evaluation.lost``); None for none."""
+        both = self.pairs.distances, self.pairs.errors[:, 2]
+        distances, headings = (np.where(self._excused, 0.0, off) for off in both)
+        return lost.lost_at(self._seconds, distances, headings)
+
+    @cached_property
+    def _seconds(self) -> Float:
+        return np.asarray((self.pairs.stamps_ns - self.known.stamps_ns[0]) / NS_PER_S)
+
+    @cached_property
+    def _excused(self) -> NDArray[np.bool_]:
+        return lost.excused(self._seconds, self.pairs.truth[:, :2])
+
     def ate(self, align: metrics.Alignment = "none") -> float:
         """Absolute trajectory error, m."""
         return metrics.ate(self.estimate, self.known, align=align).value
@@ -112,10 +119,8 @@ class Judged:
 
         What follows a kidnapping is left out as long as it does not count for a loss.
         """
-        seconds = (self.pairs.stamps_ns - self.known.stamps_ns[0]) / NS_PER_S
-        end_s = lost_s(self.pairs, self.known)
-        counts = ~lost.excused(seconds, self.pairs.truth[:, :2])
-        counts &= seconds < (math.inf if end_s is None else end_s)
+        end_s = math.inf if self.lost_s is None else self.lost_s
+        counts = ~self._excused & (self._seconds < end_s)
         off = self.pairs.distances[counts]
         return math.sqrt(float((off * off).mean())) if len(off) else None
 

@@ -11,7 +11,7 @@ import pytest
 from scripts.comparison import schema, tables
 from scripts.comparison.entry import scored
 from scripts.metrics import table
-from scripts.metrics.judged import Judged, lost_s
+from scripts.metrics.judged import Judged
 from scripts.metrics.table import METRICS
 from scripts.single_run.score import scores
 from slam import Estimate, Trajectory, create
@@ -123,7 +123,6 @@ def test_who_was_carried_away_has_ten_seconds_to_find_itself():
     found, late = (np.array([*[0.0] * 5, *[2.0] * n, *[0.0] * 20]) for n in (50, 58))
     for off, lost_at_s in ((found, None), (late, pytest.approx(11.0))):
         run = judged(off, leap_at=5)
-        assert lost_s(run.pairs, run.known) == lost_at_s
+        assert run.lost_s == lost_at_s
         assert METRICS["error_tracking_m"].of(run) == 0.0
-    plain = judged(found)
-    assert lost_s(plain.pairs, plain.known) == pytest.approx(1.0)
+    assert judged(found).lost_s == pytest.approx(1.0)

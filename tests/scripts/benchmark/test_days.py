@@ -9,6 +9,7 @@ import pytest
 from typer.testing import CliRunner
 
 from scripts.benchmark import days, publish
+from scripts.benchmark.runs_file import read
 from scripts.benchmark.tracks import TEST
 from scripts.cli import app
 from scripts.days import scores
@@ -95,8 +96,9 @@ def test_what_is_no_section_is_refused(tmp_path, text):
 def test_it_is_published_alone_and_in_place_of_an_older_one(tmp_path):
     docs = tmp_path / "docs"
     (docs / "pictures").mkdir(parents=True)
-    for page, marks in (("leaderboard.md", ("top",)), ("benchmark.md", ("tracks", "shipped"))):
-        (docs / page).write_text("".join(f"<!-- {m} -->\n<!-- /{m} -->\n" for m in marks))
+    for page, mark, _ in publish.blocks(read(), rows()):
+        with (docs / page).open("a") as file:
+            file.write(f"<!-- {mark} -->\n<!-- /{mark} -->\n")
     (tmp_path / "out").mkdir()
     told = {"schema": 1, "slams": ["shunting"], "seeds": [720, 721]}
     days.write(tmp_path / "out", told, rows())
@@ -104,7 +106,10 @@ def test_it_is_published_alone_and_in_place_of_an_older_one(tmp_path):
     for _ in range(2):
         assert publish.main(words) == 0
     page = (docs / "leaderboard.md").read_text()
-    assert page.count(f"<!-- /top -->\n\n{days.section(rows(), tables=False)}\n") == 1
+    assert page.count(f"<!-- days -->\n\n{days.section(rows(), tables=False)}\n") == 1
+    for name, mark, told in publish.blocks(read(), rows()):
+        assert f"<!-- {mark} -->\n\n{told}\n\n<!-- /{mark} -->" in (docs / name).read_text()
+    assert (docs / "pictures" / "benchmark.png").is_file()
     assert (docs / "days.csv").read_text().startswith("scene,motion,change,slam,metric,")
     copied = json.loads((docs / "days.json").read_text())
     command = "python -m scripts.benchmark.days out/days --slam shunting --seeds 2"
