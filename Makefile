@@ -41,7 +41,7 @@ docs: $(RUN) $(DOCS)/.installed  ## the site, in out/site; fails on a broken lin
 	@$(BIN)/python -m scripts.site.replays out/replays
 	@NO_MKDOCS_2_WARNING=1 $(DOCS)/bin/python -m mkdocs build --strict  # not --quiet: then it counts no warnings
 	@$(DOCS)/bin/python -m scripts.site.check out/site
-	@echo "Open out/site/index.html; to search it, too: python3 -m http.server --bind 127.0.0.1 --directory out/site"
+	@echo "Open out/site/index.html"
 
 wheel: $(STAMP)  ## build dist/*.whl, try it in an empty virtual environment, print sizes
 	@$(BIN)/hatchling build -t wheel

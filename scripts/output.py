@@ -22,7 +22,7 @@ from slam.system import config_of
 RECIPE = "recipe.json"
 # What comparisons, drives and benchmarks consist of: all else in their folders is somebody else's.
 GROWING = (
-    "*.npz", "*.npz.sha256", "*.csv", "*.png", RECIPE, "report.html", "index.html",
+    "*.npz", "*.npz.sha256", "*.csv", "*.png", "*.svg", RECIPE, "report.html", "index.html",
     "leaderboard.json", "leaderboard.md", "submission_*.json", "days.json",
     "*lives/*.json", "*lives/*.json.sha256", "runs.json",  # of folders begun before 0.3.0
 )  # fmt: skip

@@ -42,6 +42,13 @@ def test_the_site_is_strict_and_has_no_fonts_from_elsewhere():
     assert not {"extra_javascript", "google_analytics", "repo_url"} & CONFIG.keys()
 
 
+def test_search_works_from_disk_with_a_script_of_ours():
+    assert {"search", "offline"} <= {one for one in CONFIG["plugins"] if isinstance(one, str)}
+    (script,) = CONFIG["extra"]["polyfills"]
+    assert "iframe-worker" in script  # else the plugin adds one from elsewhere
+    assert (DOCS / script).is_file()
+
+
 GOOD = """<html><head><link rel="canonical" href="https://example.org/a">
 <link rel="stylesheet" href="a.css">
 <style>p { background: url(data:image/png;base64,AA==) }</style></head><body><h1 id="top">x</h1>

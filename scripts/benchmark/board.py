@@ -9,7 +9,17 @@ from functools import cached_property
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark.scores import COLUMNS, RANKED, SILENT, TRACKING, Row, ranking, scores
+from scripts.benchmark import picture
+from scripts.benchmark.scores import (
+    COLUMNS,
+    RANKED,
+    SILENT,
+    TRACKING,
+    Row,
+    lost_by_track,
+    ranking,
+    scores,
+)
 from scripts.benchmark.tracks import LEVELS, Track
 from scripts.comparison.schema import FAILED
 from scripts.comparison.tables import write_csv
@@ -97,7 +107,22 @@ class Board:
     @cached_property
     def ranking(self) -> list[Row]:
         """A row for each SLAM that made the same runs as the subject, where tracks count."""
-        return ranking({t.name: self.one_oracle(t, t.oracle) for t in self._counting}, self.subject)
+        return ranking(self._with_one_oracle(self._counting), self.subject)
+
+    def _with_one_oracle(self, tracks: Sequence[Track]) -> dict[str, list[Row]]:
+        return {track.name: self.one_oracle(track, track.oracle) for track in tracks}
+
+    def head_of(self, track: Track) -> str:
+        """Its name, with a star where it does not count."""
+        return track.name if self.fair[track.name]["counts"] else f"{track.name} *"
+
+    @property
+    def pictures(self) -> dict[str, str]:
+        """SVG by name of its file."""
+        lost = lost_by_track(self._with_one_oracle(self.tracks), self.subject)
+        heads = {self.head_of(track): lost[track.name] for track in self.tracks}
+        levels = _list(self.head.get("levels_run"))
+        return picture.drawn(heads, self.ranking, self.subject, f"levels {levels}")
 
     def one_oracle(self, track: Track, oracle: str) -> list[Row]:
         """Its runs; ``oracle``, which each track may have another of, by the name of all."""
@@ -205,7 +230,9 @@ class Board:
         return against(rows, self.subject, ODOMETRY) == -1
 
     def write(self, folder: Path) -> None:
-        """The three files."""
+        """The three files, and the pictures."""
+        for name, svg in self.pictures.items():
+            write_text(folder / name, svg)
         write_csv(folder / NAMES[1], self.rows, COLUMNS)
         head = {
             "schema": SCHEMA, **self.head, "subject": self.subject, "said": self.said(),
@@ -235,7 +262,8 @@ class Board:
 
     def markdown(self) -> str:
         """The page."""
-        parts = ["# Leaderboard", *self.said(), *self._notes()]
+        drawn = " ".join(f"![{name}]({name})" for name in self.pictures)
+        parts = ["# Leaderboard", *self.said(), drawn, *self._notes()]
         if self.ranking:
             parts += [f"## On the same {self.ranking[0]['runs']} runs", _RANKED]
             parts.append(table(RANKED_HEADS, self.ranked(), left=2))

@@ -3,49 +3,38 @@
 
 Each number of the benchmark on a page stands between marks, and all of them are filled here: in
 README.md one sentence, in docs/benchmark.md the tracks and the ranking, in docs/leaderboard.md what
-was lost at the top of each track, and the days. The folder of ``scripts.benchmark.days`` goes to
-``docs/results``, as ``days.json`` and ``days.csv``.
+was lost at the top of each track, and the days. docs/pictures gets both as pictures, docs/results
+every run as CSV, and the folder of ``scripts.benchmark.days`` as ``days.json`` and ``days.csv``.
 """
 
 import argparse
 import json
 import sys
 from collections.abc import Mapping, Sequence
-from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
-import numpy as np
-from matplotlib.axes import Axes
-from matplotlib.figure import Figure
-
-from scripts.benchmark import days
+from scripts.benchmark import days, picture
 from scripts.benchmark.board import RANKED_HEADS, Board
-from scripts.benchmark.runs_file import Results, read
-from scripts.benchmark.scores import Row, ranking
+from scripts.benchmark.runs_file import MS, Results, read
+from scripts.benchmark.scores import Row, lost_of, ranking
 from scripts.benchmark.tracks import LEVELS, Track, newest
 from scripts.comparison.tables import write_csv
 from scripts.console import ended
 from scripts.days.scores import LEVEL_COLUMNS, levels
-from scripts.figures import save, styled
 from scripts.marks import fill_page, table
-from scripts.report.answer import ODOMETRY
+from scripts.pages.table import NONE
 from scripts.result_files import RESULTS, ROOT
 from slam.files import write_text
 from slam.system import OWN
-from slam.variants import ORACLE
 
 DOCS = ROOT / "docs"
 _COUNTS = {True: "yes", False: "no", None: "open"}
 FRONT, PAGE, BOARD = "../README.md", "benchmark.md", "leaderboard.md"
 _OURS = ("shunting", "occupancy", "ekf")
-PERCENT = 100.0
-SHORT = 8  # digits of a commit
-APART = 4.2  # percent between two names at the ends of their lines
-_COLORS = ("#ce2c3c", "#1f61be", "#7a3fb0", "#0b8c96", "#8c6d1f", "#5d8a1e", "#b8418f", "#2f9fd0",
-           "#a0583c", "#3b2f7d", "#59616e", "#de6e18")  # fmt: skip
-_CONTROL = "#9a9a9a"
-_MARKERS = "osD^vP*Xh<>d"
+LEAST = 10  # runs of a SLAM at level 1: of fewer no cell is shown
+TABLE = "benchmark.csv"
+COLUMNS = ("SLAM", "track", "level", "seed", "commit", "lost", "error_m", "ms")
 
 
 def tracks_of(of: Results) -> list[Track]:
@@ -71,23 +60,20 @@ def board_of(of: Results) -> Board:
 
 
 def shipped(of: Results) -> str:
-    """The ranking, and what it is of."""
+    """The ranking, with the share lost at each level, and what it is of."""
     board = board_of(of)
-    made, on = of.made_with, of.made_with["machine"]["processor"]
-    rows = [
-        [*cells, ", ".join(commit[:SHORT] for commit in of.commits(cells[1], board.tracks))]
-        for cells in board.ranked()
-    ]
+    one, made = board.ranking[0], of.made_with
+    lost = {
+        row["slam"]: [f"{100.0 * s:.0f} %" for s in row["lost_shares"]] for row in board.ranking
+    }
+    rows = [[*cells, *lost[cells[1]]] for cells in board.ranked()]
+    heads = [*RANKED_HEADS, *(f"level {level:g}" for level in one["levels"])]
     return (
-        f"{table([*RANKED_HEADS, 'commits'], rows, left=2)}\n\n{_ranked_runs(board)}; "
-        f"{on}, MuJoCo {made['versions']['mujoco']}. Commits are those that made that SLAM's rows, "
-        "of all runs that ship, the first the most."
+        f"{table(heads, rows, left=2)}\n\n"
+        f"The last columns are the share lost at each level, of {_list(one['runs_at'])} runs: the "
+        f"first seeds of the tracks that count. Code {made['commit']}; "
+        f"{made['machine']['processor']}, MuJoCo {made['versions']['mujoco']}."
     )
-
-
-def _ranked_runs(board: Board) -> str:
-    one, counting = board.ranking[0], len(read().quick(board.tracks))
-    return f"{one['runs']} runs: {counting} tracks that count, levels {_list(one['levels'])}"
 
 
 def in_a_sentence(of: Results) -> str:
@@ -106,22 +92,41 @@ def in_a_sentence(of: Results) -> str:
     )
 
 
-def at_the_top(of: Results) -> str:
-    """Runs lost at level 1, of how many: a row for each track, a column for each SLAM."""
+def at_the_top(of: Results) -> dict[str, dict[str, tuple[int, int]]]:
+    """By track and SLAM the runs lost at level 1, and all; only where there are ``LEAST``."""
     board = board_of(of)
-    rows = {track.name: board.one_oracle(track, track.oracle) for track in board.tracks}
-    there = [row["slam"] for own in rows.values() for row in own]
-    slams = list(dict.fromkeys([*(row["slam"] for row in board.ranking), *there]))
+    found = {}
+    for track in board.tracks:
+        rows = board.one_oracle(track, track.oracle)
+        top = (row for row in rows if row["dynamism"] == LEVELS[-1])
+        found[board.head_of(track)] = lost_of(top, LEAST)
+    return found
+
+
+def top_table(of: Results) -> str:
+    """A row for each track, a column for each SLAM."""
+    lost = at_the_top(of)
+    ranked = [row["slam"] for row in board_of(of).ranking]
+    there = {slam for own in lost.values() for slam in own}
+    slams = sorted(there, key=lambda slam: ranked.index(slam) if slam in ranked else len(ranked))
     lines = [
-        [track.name, _COUNTS[track.counts], *(_lost(rows[track.name], s) for s in slams)]
-        for track in board.tracks
+        [track, *("{} of {}".format(*own[s]) if s in own else NONE for s in slams)]
+        for track, own in lost.items()
     ]
-    return table(["track", "counts", *slams], lines, left=2)
+    return table(["track", *slams], lines)
 
 
-def _lost(rows: Sequence[Row], slam: str) -> str:
-    own = [row["lost"] for row in rows if (row["slam"], row["dynamism"]) == (slam, LEVELS[-1])]
-    return f"{sum(own)} of {len(own)}" if own else "–"
+def runs_table(of: Results) -> list[Row]:
+    """A row for each run and SLAM of the file that ships."""
+    return [
+        {
+            "SLAM": slam, "track": track, "level": f"{at[0]:g}", "seed": at[1],
+            "commit": of.made_with["commit"], "lost": row["lost"],
+            "error_m": row["error_tracking_m"], "ms": row[MS],
+        }
+        for track, runs in of.runs.items() for at, (_, slams) in runs.items()
+        for slam, row in slams.items()
+    ]  # fmt: skip
 
 
 def _list(values: Sequence[float]) -> str:
@@ -143,7 +148,7 @@ def blocks(of: Results, aged: Sequence[Mapping[str, Any]]) -> list[tuple[str, st
         (FRONT, "benchmark", in_a_sentence(of)),
         (PAGE, "tracks", tracks_table(list(newest().values()))),
         (PAGE, "shipped", shipped(of)),
-        (BOARD, "top", at_the_top(of)),
+        (BOARD, "top", top_table(of)),
         (BOARD, "days", f"{days.section(aged, tables=False)}\n\n{_DAYS}"),
     ]
 
@@ -162,9 +167,12 @@ def publish(docs: Path, results: Path, aged: Path | None, commit: str) -> None:
             text = text.replace("{\n", head, 1)
         write_text(copy, text)
     of, rows = read(), days.read(results / days.NAMES[1])
+    board, where = board_of(of), f"level {LEVELS[-1]:g}"
+    drawn = picture.drawn(at_the_top(of), board.ranking, board.subject, where)
+    for name, svg in drawn.items():
+        write_text(docs / "pictures" / name, svg)
     write_csv(results / days.NAMES[0], levels(rows), LEVEL_COLUMNS)
-    board = board_of(of)
-    overall(board.ranking, _ranked_runs(board), docs / "pictures" / "benchmark.png")
+    write_csv(results / TABLE, runs_table(of), COLUMNS)
     for page, mark, told in blocks(of, rows):
         fill_page(docs / page, mark, told, most=len(told))  # the table of the page, however long
 
@@ -184,57 +192,6 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--commit", default="", help="of the code that ran the days")
     wanted = parser.parse_args(arguments)
     publish(wanted.docs, wanted.results, wanted.days, wanted.commit)
-
-
-def _look(slam: str, k: int) -> dict[str, Any]:
-    if slam.startswith(ORACLE):
-        return {"color": "#202020", "ls": "--", "marker": "", "lw": 1.6}
-    if slam == ODOMETRY:
-        return {"color": _CONTROL, "ls": ":", "marker": "", "lw": 1.6}
-    wide = 2.4 if slam == "shunting" else 1.4
-    return {"color": _COLORS[k % len(_COLORS)], "ls": "-", "lw": wide, "ms": 4.5, "mec": "white",
-            "mew": 0.5, "marker": _MARKERS[k % len(_MARKERS)]}  # fmt: skip
-
-
-@styled({"grid.alpha": 0.3})
-def overall(ranked: Sequence[Row], title: str, path: Path) -> None:
-    """Of rows of ``scores.ranking`` the shares lost, each SLAM named at the end of its line."""
-    figure = Figure(figsize=(8.2, 4.6))
-    ax: Axes = figure.subplots()
-    levels = [float(level) for level in ranked[0]["levels"]]
-    named = sorted((row["slam"] for row in ranked), key=lambda slam: (slam != "shunting", slam))
-    last, right = levels[-1], 0.03 * (levels[-1] - levels[0])
-    places = spread([PERCENT * row["lost_shares"][-1] for row in ranked])
-    for row, at in zip(ranked, places, strict=True):
-        shares = [PERCENT * share for share in row["lost_shares"]]
-        look = _look(row["slam"], named.index(row["slam"]))
-        ax.plot(levels, shares, **look)
-        ax.plot([last, last + right], [shares[-1], at], color=look["color"], lw=0.6, clip_on=False)
-        ax.text(last + 1.3 * right, at, f"{row['slam']}  {shares[-1]:.0f} %", color=look["color"],
-                va="center", fontsize=8.5, clip_on=False)  # fmt: skip
-    ax.set_xticks(levels)
-    ax.set(xlim=(levels[0], last), ylim=(-7.0, 107.0), yticks=np.arange(0.0, 101.0, 25.0))
-    ax.set(xlabel="level of a track, 0 (nothing of its trouble) to 1 (all)")
-    ax.set_ylabel("share of runs lost, %")
-    ax.set_title(title, loc="left", fontsize=10)
-    path.parent.mkdir(parents=True, exist_ok=True)
-    save(figure, path)
-
-
-def spread(ends: Sequence[float]) -> list[float]:
-    """Places for names at these heights: in their order, ``APART`` or more apart, within the axes.
-
-    They are put from the bottom up, then pushed down from 100 where they do not fit.
-    """
-    order = np.argsort(np.asarray(ends), kind="stable").tolist()
-    places = np.asarray(ends, dtype=np.float64)
-    for below, k in pairwise(order):
-        places[k] = max(places[k], places[below] + APART)
-    top = max(PERCENT, APART * (len(ends) - 1))
-    for k in reversed(order):
-        places[k] = min(places[k], top)
-        top = float(places[k]) - APART
-    return [float(place) for place in places]
 
 
 if __name__ == "__main__":

@@ -3,11 +3,10 @@
 
 A reader's SLAM gets a row between the others on the same recordings, without running the others.
 
-    python -m scripts.benchmark.published out/quick out/top --commit HASH   # writes published.json
-    python -m scripts.benchmark.published out/top --run shunting --levels 1 --seeds 20
+    python -m scripts.benchmark.published out/top --levels 1 --seeds 10 --run shunting karto
+    python -m scripts.benchmark.published out/low out/top --commit HASH   # writes published.json
 
-Each row says which commit made it: rows that are not in the folders, or not of ``--only SLAM``,
-stay as they are.
+The first goes on where it was stopped. All rows of the file are of one commit.
 """
 
 import argparse
@@ -17,8 +16,8 @@ from itertools import product
 from pathlib import Path
 from typing import Any
 
-from scripts.benchmark.runs_file import CELLS, FILE, At, Commit, Results, Row, read, write
-from scripts.benchmark.tracks import FRESH, LEVELS, TRACKS, Track, chosen
+from scripts.benchmark.runs_file import COLUMNS, FILE, At, Commit, Made, Results, Row, read, write
+from scripts.benchmark.tracks import LEVELS, TRACKS, Track, chosen
 from scripts.comparison.folder import read as compared
 from scripts.comparison.make import carry_out as compare
 from scripts.comparison.plan import RECORDINGS, Plan
@@ -37,44 +36,30 @@ def digests(plan: Plan, folder: Path) -> dict[At, str]:
     return {(run.dynamism, run.seed): digest(file) for run, file in files.items()}
 
 
-def write_from(
-    folders: Sequence[Path], path: Path, commit: str, only: Sequence[str] | None = None
-) -> Results:
-    """Of folders of ``mobilia benchmark``, all tracks that are whole in them, beside what is there.
+def write_from(folders: Sequence[Path], path: Path, commit: str) -> Results:
+    """Of folders of ``mobilia benchmark`` or ``--run``, all tracks that are whole in them.
 
     commit  of the code that made their rows
-    only    SLAMs whose rows are taken; None: all
 
-    Raises ``InvalidValueError`` for two folders whose recordings differ, for what is no commit, and
-    for SLAMs of ``only`` that have no row in the folders.
+    Raises ``InvalidValueError`` for what is no commit, for folders without a track and for two
+    whose recordings differ.
     """
     shaped("--commit", commit, Commit)
-    made: Row = {"versions": versions(), "machine": machine()}
-    before = read(path) if path.exists() else Results(runs={}, made_with=made)
-    runs = {track: dict(own) for track, own in before.runs.items()}
-    made_here: set[str] = set()
+    runs: dict[str, Made] = {}
     for folder, track in product(folders, TRACKS.values()):
         if not (folder / track.name / "recipe.json").exists():
             continue
         there = runs.setdefault(track.name, {})
-        for at, scans, own in _made(folder / track.name, track):
-            rows = {slam: row | {"commit": commit} for slam, row in own.items()
-                    if only is None or slam in only}  # fmt: skip
+        for at, scans, rows in _made(folder / track.name, track):
             known, others = there.get(at, (scans, {}))
             if known != scans:
                 key = f"{track.name} {at[0]:g} {at[1]}"
                 raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
             there[at] = (scans, {**others, **rows})
-            made_here |= set(rows)
-    if missing := sorted(set(only or ()) - made_here):
-        raise InvalidValueError(
-            f"--only {' '.join(missing)}: no row in {', '.join(map(str, folders))}"
-        )
-    earlier = before.made_with
-    made["versions"] = {k: _each(earlier["versions"].get(k, v), v) for k, v in versions().items()}
-    processors = (of["machine"]["processor"] for of in (earlier, made))
-    made["machine"] = made["machine"] | {"processor": _each(*processors)}
-    write(path, Results(runs=runs, made_with=made))
+    if not runs:
+        raise InvalidValueError(f"no track in {', '.join(map(str, folders))}")
+    made_with = {"commit": commit, "versions": versions(), "machine": machine()}
+    write(path, Results(runs=runs, made_with=made_with))
     return read(path)
 
 
@@ -85,12 +70,7 @@ def _made(folder: Path, track: Track) -> Iterator[tuple[At, str, dict[str, Row]]
     plan = track.plan(asked["slams"], tuple(asked["seeds"]), levels=tuple(asked["levels"]))
     for at, scans in digests(plan, folder).items():
         rows = (row for row in done.runs if (row["dynamism"], row["seed"]) == at)
-        yield at, scans, {row["slam"]: {k: _short(row.get(k)) for k in CELLS} for row in rows}
-
-
-def _each(*told: str) -> str:
-    """Of lists with commas, each entry once."""
-    return ", ".join(dict.fromkeys(", ".join(told).split(", ")))
+        yield at, scans, {row["slam"]: {k: _short(row.get(k)) for k in COLUMNS} for row in rows}
 
 
 def _short(value: Any) -> Any:
@@ -105,25 +85,21 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("folders", type=Path, nargs="+", help="of mobilia benchmark, or --run")
     parser.add_argument("--out", type=Path, default=FILE)
     parser.add_argument("--commit", help="of the code that ran")
-    parser.add_argument("--only", nargs="+", metavar="SLAM", help="take only their rows")
     parser.add_argument("--run", nargs="+", metavar="SLAM", help="only run these into the folder")
     parser.add_argument("--tracks", nargs="+", help="default the newest of all")
     parser.add_argument("--levels", type=float, nargs="+", default=list(LEVELS))
-    parser.add_argument("--first", type=int, default=0, help="of the test seeds")
-    parser.add_argument("--seeds", type=int, default=1)
-    parser.add_argument("--fresh", action="store_true", help=f"seeds from {FRESH[0]} on, instead")
+    parser.add_argument("--seeds", type=int, default=1, help="the first so many that count")
     wanted = parser.parse_args(arguments)
     if wanted.run:
         for track in chosen(wanted.tracks):
-            of = FRESH if wanted.fresh else track.test
-            seeds = of[wanted.first : wanted.first + wanted.seeds]
+            seeds = track.test[: wanted.seeds]
             plan = track.plan(wanted.run, seeds, levels=tuple(wanted.levels))
             note(f"{track.name}: {track.about}")
             compare(plan, wanted.folders[0] / track.name)
         return
     if not wanted.commit:
         raise InvalidValueError("--commit must say of which code the runs are")
-    made = write_from(wanted.folders, wanted.out, wanted.commit, wanted.only)
+    made = write_from(wanted.folders, wanted.out, wanted.commit)
     print(f"{wanted.out}: {sum(map(len, made.runs.values()))} recordings")
 
 

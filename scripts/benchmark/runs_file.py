@@ -8,7 +8,6 @@ on the very scans of the others. Nothing in it is ever run: a SLAM's name is a w
 import hashlib
 import json
 import re
-from collections import Counter
 from collections.abc import Iterable, Mapping, Sequence
 from dataclasses import dataclass
 from itertools import product
@@ -45,7 +44,8 @@ CELLS = (
     "outcome", "lost", "lost_at_s", "error_tracking_m", "ate_unaligned_m", "rpe_m_per_m",
     "silent_share",
 )  # fmt: skip
-COLUMNS = (*CELLS, "commit")  # of the runs that ship
+MS = "ms_per_scan_p50"
+COLUMNS = (*CELLS, MS)  # of the runs that ship
 _SECTIONS = ("errors", "honesty", "costs")
 # Metrics of which less is better, but for "lost", which is a word of every run.
 _METRICS = {
@@ -69,7 +69,7 @@ Made = dict[At, tuple[str, dict[str, Row]]]  # digest of the recording, and a ro
 class Results:
     """Runs by track, then by level and seed: the digest of the recording, and a row of each SLAM.
 
-    made_with  versions and machine; where there were several, a list with commas
+    made_with  versions and machine; of runs that ship, the commit of their code, too
     name       what tables call the SLAM of a submission: letters, digits, "_", "-", "."; ""
                where these are runs that ship, of many SLAMs
     slam       the name that it ran by, with the numbers that were set: a word, never run
@@ -131,14 +131,6 @@ class Results:
             if track.counts is not False
             and self.has(track.name, [(at, track.test[0]) for at in QUICK_LEVELS], ODOMETRY)
         )  # fmt: skip
-
-    def commits(self, slam: str, tracks: Iterable[Track]) -> list[str]:
-        """Those that made its rows of these tracks, whichever made the most first."""
-        made = Counter(
-            slams[slam]["commit"]
-            for track in tracks for _, slams in self.runs[track.name].values() if slam in slams
-        )  # fmt: skip
-        return [commit for commit, _ in made.most_common()]
 
     def origin(self) -> Row:
         """What a leaderboard says of where a submission comes from: words, in one line each."""
@@ -285,7 +277,7 @@ _RUN: Columns = {
     "slams": Annotated[dict[str, Any], Meta(max_length=MAX_SLAMS)],
 }  # fmt: skip
 _CELLS: Columns = {
-    "poses": _SHA256, "commit": Commit, "outcome": word(among=("finished", "lost", *FAILURES)),
+    "poses": _SHA256, "outcome": word(among=("finished", "lost", *FAILURES)),
     "failure": word(most=MAX_WORDS, optional=True), "lost": Literal[0, 1],
     **{key: number(most=1.0 if key.endswith(_SHARES) else MOST, optional=True) for key in NUMBERS},
 }  # fmt: skip

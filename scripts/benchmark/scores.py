@@ -3,7 +3,7 @@
 
 import math
 from collections import Counter
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterable, Mapping, Sequence
 from typing import Any
 
 import numpy as np
@@ -162,6 +162,7 @@ def summed(runs: Sequence[tuple[tuple[Any, ...], Row]]) -> Row:
     return {
         "levels": levels,
         "lost_shares": shares.tolist(),
+        "runs_at": (~np.isnan(table)).sum(axis=0).tolist(),
         "runs": len(runs),
         "lost_runs": int(np.nansum(table)),
         "lost_from": lost_from(levels, shares),
@@ -229,11 +230,12 @@ RANKED = (
 )  # fmt: skip
 
 
-def ranking(runs: Mapping[str, Sequence[Row]], subject: str) -> list[Row]:
-    """SLAMs on the same runs, by the level they are lost from, then by the error while not lost.
+def same_runs(
+    runs: Mapping[str, Sequence[Row]], subject: str
+) -> dict[str, dict[tuple[str, float, int], Row]]:
+    """By SLAM, its rows of those runs of the subject that half of the SLAMs made too.
 
-    runs  rows by track. Those that count here are the subject's that half of the SLAMs made too.
-          Who lacks one of them has no place
+    runs  rows by track
     """
     made: dict[str, dict[tuple[str, float, int], Row]] = {}
     for track, rows in runs.items():
@@ -241,13 +243,19 @@ def ranking(runs: Mapping[str, Sequence[Row]], subject: str) -> list[Row]:
             made.setdefault(row["slam"], {})[track, *_run(row)] = row
     times = Counter(run for own in made.values() for run in own)
     same = sorted(run for run in made.get(subject, ()) if 2 * times[run] > len(made))
+    return {slam: {run: own[run] for run in same if run in own} for slam, own in made.items()}
+
+
+def ranking(runs: Mapping[str, Sequence[Row]], subject: str) -> list[Row]:
+    """SLAMs by the level they are lost from, then by the error while not lost.
+
+    Who lacks one of ``same_runs`` has no place.
+    """
+    made = same_runs(runs, subject)
     of = [
-        {
-            "slam": slam,
-            **summed([((track, seed), own[track, at, seed]) for track, at, seed in same]),
-        }
+        {"slam": slam, **summed([((track, seed), row) for (track, _, seed), row in own.items()])}
         for slam, own in made.items()
-        if same and own.keys() >= set(same)
+        if len(own) == len(made.get(subject, ())) > 0
     ]
     return sorted(
         of,
@@ -257,3 +265,25 @@ def ranking(runs: Mapping[str, Sequence[Row]], subject: str) -> list[Row]:
             math.inf if row[TRACKING] is None else row[TRACKING],
         ),
     )
+
+
+def lost_of(rows: Iterable[Row], least: int = 1) -> dict[str, tuple[int, int]]:
+    """By SLAM the runs lost and all, where it has at least so many of these."""
+    found: dict[str, list[int]] = {}
+    for row in rows:
+        found.setdefault(row["slam"], []).append(int(row["lost"]))
+    return {slam: (sum(own), len(own)) for slam, own in found.items() if len(own) >= least}
+
+
+def lost_by_track(
+    runs: Mapping[str, Sequence[Row]], subject: str
+) -> dict[str, dict[str, tuple[int, int]]]:
+    """By track and SLAM the runs lost and all, of ``same_runs``; who lacks one has none there."""
+    found: dict[str, list[Row]] = {track: [] for track in runs}
+    for own in same_runs(runs, subject).values():
+        for (track, _, _), row in own.items():
+            found[track].append(row)
+    return {
+        track: lost_of(rows, sum(row["slam"] == subject for row in rows))
+        for track, rows in found.items()
+    }

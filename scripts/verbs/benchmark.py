@@ -9,7 +9,7 @@ from rich.markup import escape
 from rich.table import Table
 
 from scripts import options
-from scripts.console import console, note, say
+from scripts.console import console, fact, note, say
 from scripts.names import check
 from scripts.options import named
 from scripts.spec import SLAMS, names_of, option, part, spec
@@ -21,6 +21,7 @@ if TYPE_CHECKING:
 
 
 UNFAIR = "* does not count: no oracle holds there"
+SAID = 2  # sentences over the pictures: the answer and the place; the rest is by the last table
 MOST_COLUMNS = 5  # SLAMs in the table of the terminal; the page has all
 
 
@@ -123,9 +124,8 @@ def _tell(board: "Board", out: Path, spent_s: float) -> None:
     for name in shown:
         table.add_column(escape(name), justify="right", overflow="fold")
     for track in board.tracks:
-        mark = "" if board.fair[track.name]["counts"] else " *"
         cells = (escape(lost_from_words(board.row(track.name, name))) for name in shown)
-        table.add_row(track.name + mark, *cells)
+        table.add_row(board.head_of(track), *cells)
     console.print(table)
     for name, why in board.missing.items():
         note(f"{name} is not installed: {why}")
@@ -133,19 +133,25 @@ def _tell(board: "Board", out: Path, spent_s: float) -> None:
         note(f"{name} was submitted, as SLAM {one['slam']}: its results are the submitter's word")
     for failure in board.failures():
         note(failure)
-    unfair = f"{table.caption}." if table.caption else ""
-    parts = [Part(title="Lost from which level", note=unfair, table=table)]
+    said, more = board.said()[:SAID], board.said()[SAID:]
+    for line in more:
+        fact(line)
+    if table.caption:
+        more.append(f"{table.caption}.")
+    titles = ("On which track", "From which level on")
+    parts = [Part(title=of, picture=p) for of, p in zip(titles, board.pictures, strict=False)]
     places = _places(board)
     if places is not None:
         console.print(places)
-        parts.insert(0, Part(title=f"Ranking {places.title}", table=places))
+        parts.append(Part(title=f"Ranking {places.title}", table=places))
+    parts.append(Part(title="Lost from which level", note=" ".join(more), table=table))
     say(f"To cite: {escape(board.cite())}")
     if board.days_page:
         _tell_days(out)
     reports = [command("report", out / track.name) for track in board.tracks[:3]]
     publish(out, Page(
         title=f"{board.subject} on {len(board.tracks)} track{'s' * (len(board.tracks) > 1)}",
-        said=board.said(), parts=parts,
+        said=said, parts=parts,
         next={
             "A track run by run, and what misled it:": "\n".join(reports),
             "Hand it in:": command("benchmark", "--slam", board.subject, "--submit", "NAME"),
