@@ -119,7 +119,8 @@ class _Ground:
         between = self._at(int(np.argmin(away)))
         ends = [self._nearest(mask, between) for mask in (here, part)]
         n = max(2, round(math.dist(*ends) / STEP_M))
-        line = np.column_stack([np.linspace(*along, n) for along in zip(*ends, strict=True)])
+        (a, b), (c, d) = ends
+        line = np.column_stack([np.linspace(a, c, n), np.linspace(b, d, n)])
         gaps = np.array([gap_to_boxes(line, box[None]) for box in self.scene.obstacles])
         told = (
             f"{self._area(part):.0f} m2 of floor about ({x:.1f}, {y:.1f}){with_goals} cannot be "

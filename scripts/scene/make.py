@@ -36,11 +36,11 @@ SWEEPS = 4000  # scans of a log, at most, by which it is known what floor is fre
 
 @dataclass(frozen=True, kw_only=True)
 class Made:
-    """The files of a scene, its plan, and the scene."""
+    """The files of a scene, its plan, and how it starts."""
 
     files: tuple[Path, ...]
     plan: MapPlan
-    scene: "Seen"
+    seen: "Seen"
 
 
 class Seen:
@@ -64,10 +64,6 @@ class Seen:
         robot_m = tour_of(self._world.robot).robot_radius_m
         return list(problems(self.scene, robot_m, self._which))
 
-    def contents(self) -> Iterator[str]:
-        """What stands and what can move, a line each."""
-        return contents(self.scene)
-
 
 def contents(scene: Scene) -> Iterator[str]:
     """What stands and what can move, a line each."""
@@ -86,7 +82,7 @@ def contents(scene: Scene) -> Iterator[str]:
 
 def _counts(counts: Counter[str]) -> str:
     each = ", ".join(f"{n} {kind}" for kind, n in sorted((+counts).items()))
-    return f"{counts.total()} ({each})" if each else "nothing"
+    return f"{counts.total()} ({each})" if len(+counts) > 1 else each or "nothing"
 
 
 def made(  # noqa: PLR0913 (by keyword)
@@ -114,7 +110,7 @@ def made(  # noqa: PLR0913 (by keyword)
     cells = (np.column_stack([columns, rows]) + 0.5) * map_.resolution_m
     gaps = () if doors != "none" else tuple(map(_ends, drawn.gaps))
     seen.picture(image, se2.transform(map_.T_map_origin, cells), gaps)
-    return Made(files=(toml, toml.with_suffix(".xml"), image), plan=drawn, scene=seen)
+    return Made(files=(toml, toml.with_suffix(".xml"), image), plan=drawn, seen=seen)
 
 
 def _ends(gap: Passage) -> Float:

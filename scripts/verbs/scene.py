@@ -52,11 +52,11 @@ class Parts:
 
         with working("finding walls and rooms"):
             done = make.made(map_, how, stem, furniture=self.furniture, doors=self.doors, **more)
-        for line in (*make.in_words(done.plan), *done.scene.contents()):
+        for line in (*make.in_words(done.plan), *make.contents(done.seen.scene)):
             say(line, highlight=False)
         toml, xml, picture = done.files
         note(f"wrote {toml} (the scene's name), {xml} (walls and rooms) and {picture}")
-        for problem in done.scene.problems():
+        for problem in done.seen.problems():
             fact(f"{toml}: {problem}", bad=True)
 
 
@@ -138,11 +138,11 @@ class Show:
 
     def __call__(self) -> None:
         check_names([], self.which)
-        from scripts.scene.make import Seen
+        from scripts.scene.make import Seen, contents
 
         path = (self.out or Path(f"{file_name(Path(self.which).stem)}-seen")).with_suffix(".png")
         seen = Seen(self.which, self.seed)
-        for line in seen.contents():
+        for line in contents(seen.scene):
             say(line, highlight=False)
         note(f"wrote {seen.picture(path)}")
 
