@@ -27,7 +27,8 @@ NARROW_M = 0.1  # gaps that are narrower are not told
 DOOR_M = 1.2  # from a hinge to a spot to visit
 LEAST_M2 = 2.0  # of floor; smaller pockets that the robot cannot reach are not told
 MOST_TOLD = 5  # pieces of floor, the largest ones
-STEP_M = 0.01
+MOST_NAMED = 2  # walls between the start and such a piece, the nearest to the start
+STEP_M, MOST_STEPS = 0.01, 2000  # along the way to a piece of floor
 
 
 def problems(
@@ -118,7 +119,7 @@ class _Ground:
         away = _away(here) + _away(part)
         between = self._at(int(np.argmin(away)))
         ends = [self._nearest(mask, between) for mask in (here, part)]
-        n = max(2, round(math.dist(*ends) / STEP_M))
+        n = min(max(2, round(math.dist(*ends) / STEP_M)), MOST_STEPS)
         (a, b), (c, d) = ends
         line = np.column_stack([np.linspace(a, c, n), np.linspace(b, d, n)])
         gaps = np.array([gap_to_boxes(line, box[None]) for box in self.scene.obstacles])
@@ -126,9 +127,11 @@ class _Ground:
             f"{self._area(part):.0f} m2 of floor about ({x:.1f}, {y:.1f}){with_goals} cannot be "
             "reached from the start: "
         )
-        crossed = np.flatnonzero(gaps.min(axis=1) == 0.0).tolist()
-        if crossed:
-            return f"{told}{self._names(crossed)} shuts it off"
+        crossed = np.flatnonzero(gaps.min(axis=1) == 0.0)
+        if len(crossed):
+            crossed = crossed[np.argsort(gaps[crossed].argmin(axis=1), kind="stable")]
+            more = f" (and {len(crossed) - MOST_NAMED} more)" if len(crossed) > MOST_NAMED else ""
+            return f"{told}{self._names(crossed[:MOST_NAMED].tolist())}{more} shuts it off"
         narrow = int(np.argmin(gaps.min(axis=0)))
         u, v = line[narrow].tolist()
         return (
