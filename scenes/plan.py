@@ -102,10 +102,12 @@ class Plan:
     def __init__(self, source: str, *, floors: Sequence[str] = ()) -> None:
         """``source``: name of one of our plans or path of an MJCF file; ``floors``: materials that
         will be used beside those of the file."""
-        written = file_of("plans", source).stat().st_mtime_ns
+        path = file_of("plans", source)
+        written = path.stat().st_mtime_ns
         spec, self.marks = _parsed(source, tuple(floors), written)
         self.spec = spec.copy()
         self._source, self._file = Path(source).name, source if source.endswith(".xml") else ""
+        self.file = self._file or path.name
         self.seats: list[Mark] = list(self.find("seat"))
         self.put: list[tuple[str, Pose]] = []
         self._furniture: list[list[float]] = []

@@ -233,6 +233,7 @@ def finish(builder: Builder, name: str, seed: int, options: Mapping[str, object]
         start=plan.start,
         options=dict(options),
         places=_places(plan),
+        plan_file=plan.file,
     )
 
 

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """What a recipe hands to the world: a model to compile and the facts a simulator needs about it."""
 
+from collections import Counter
 from collections.abc import Mapping
 from dataclasses import dataclass, field, replace
 from functools import cached_property
@@ -108,6 +109,7 @@ class Scene:
     holds        who holds what
     places       (kind, pose) of the plan's seats and spots, whether taken or not, and ("opening",
                  pose) of each doorway without a door
+    plan_file    name of the MJCF file of its walls
     """
 
     name: str
@@ -126,6 +128,12 @@ class Scene:
     roles: Mapping[str, Role] = field(default_factory=dict)
     holds: tuple[Hold, ...] = ()
     places: tuple[tuple[str, Pose], ...] = ()
+    plan_file: str = ""
+
+    @property
+    def can_move(self) -> Counter[Kind]:
+        """How many of each kind can move, beside the robot."""
+        return Counter(mover.kind for mover in self.movers if mover.group != "robot")
 
     @cached_property
     def static_map(self) -> Raster:

@@ -30,7 +30,6 @@ NEAR_M = 0.05  # a cell of a wall is built where a box is that near
 LONG_M = 0.3  # a box that is shorter is a piece of one
 HULL_M = 0.15  # a robot that drives so near to a thing drives through it
 RIM_M = 1.0  # of a map round all that is occupied
-EDGE_M = 0.5  # of walls round the rooms
 NOISE = "is it a map of rooms, or noise?"
 
 
@@ -89,9 +88,11 @@ class MapPlan:
     walls   (n, 5) boxes: cx, cy, half length, half thickness, yaw
     rooms   name -> rectangles xmin, ymin, xmax, ymax
     gaps    passages as wide as a door
+    ends    (n, 5) boxes that shut the floor off where the map ends without a wall
     """
 
     walls: Float
+    ends: Float
     things: tuple[Thing, ...]
     rooms: dict[str, tuple[Rect, ...]]
     goals: tuple[Point, ...]
@@ -124,9 +125,10 @@ def plan(map_: Raster, options: FromMap | None = None, *, source: str = "map") -
         cells, cells.mostly(free | (occupied & ~solid)), walls, boxes,
         start=options.start, path=options.path, robot_m=options.robot_m, source=source,
     )  # fmt: skip
-    check_span(source, bounds_of(floor.rooms))
+    check_span(source, floor.bounds)
     return MapPlan(
         walls=_moved(walls, T_map_cells),
+        ends=_moved(floor.ends, T_map_cells),
         things=tuple(
             replace(
                 t,
@@ -139,7 +141,7 @@ def plan(map_: Raster, options: FromMap | None = None, *, source: str = "map") -
         goals=floor.goals,
         start=floor.start,
         gaps=floor.gaps,
-        bounds=bounds_of(floor.rooms),
+        bounds=floor.bounds,
         figures=_figures(walls, np.vstack([walls, boxes]), occupied, floor, cell),
     )
 
@@ -253,13 +255,6 @@ def _outline(box: Float) -> Float:
     u = np.linspace(-a, a, max(2, round(2.0 * a / 0.02)))
     local = np.vstack([np.column_stack([u, np.full(len(u), side)]) for side in (-b, b)])
     return np.asarray(se2.transform(np.array([x, y, yaw]), local))
-
-
-def bounds_of(rooms: dict[str, tuple[Rect, ...]]) -> Rect:
-    """Around all rooms and the walls next to them."""
-    rects = np.array([rect for own in rooms.values() for rect in own])
-    low, high = rects[:, :2].min(axis=0) - EDGE_M, rects[:, 2:].max(axis=0) + EDGE_M
-    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
 
 
 def _moved(boxes: Float, T: Float) -> Float:

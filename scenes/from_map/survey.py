@@ -9,6 +9,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from scenes.from_map import floor as floors
+from scenes.from_map.ends import ends_of
 from scenes.from_map.floor import Passage, Point, Rect
 from scenes.from_map.walls import footprint
 from scenes.plan_file import check_span
@@ -28,6 +29,7 @@ NEAR_PATH_M = 4.0  # floor of a log is so near to the robot's way
 DOOR_CLEAR_M = 1.7  # from the middle of a door to a spot to visit: 1.2 m from its hinge
 DOOR_M = (0.7, 1.2)  # gaps that may be doors
 RIM = 2  # cells around the floor when rooms are cut
+EDGE_M = 0.5  # of floor round the rooms
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -36,6 +38,8 @@ class Survey:
 
     rooms    name -> rectangles xmin, ymin, xmax, ymax     area_m2  that the robot can reach
     gaps     passages as wide as a door
+    bounds   around all rooms and the walls next to them
+    ends     (n, 5) boxes that shut the floor off where it ends without a wall
     """
 
     start: Pose
@@ -43,6 +47,8 @@ class Survey:
     rooms: dict[str, tuple[Rect, ...]]
     gaps: tuple[Passage, ...]
     area_m2: float
+    bounds: Rect
+    ends: Float
 
 
 def survey(  # noqa: PLR0913 (what is known of a building)
@@ -69,12 +75,14 @@ def survey(  # noqa: PLR0913 (what is known of a building)
     if path is not None:
         driven = cells.beside(path, robot_m + floors.MARGIN_M + 2.0 * cells.cell_m)
         ground, passable = ground | driven, passable | driven
+        known = ground
         wide = floors.clearance(ground, cells.cell_m) >= 0.5 * LEAK_M
         ground &= _away(cells.reached(driven, wide | driven, NEAR_PATH_M)) <= leak
     else:
         inside = ground & ~_outside(built, cells)
         if inside.sum() >= INSIDE * ground.sum():
             ground = inside
+        known = ground
     clear = floors.clearance(ground, cells.cell_m)
     labels = floors.rooms_of(clear, ground)
     outdoors = set(floors.outdoors(labels, built))
@@ -108,12 +116,15 @@ def survey(  # noqa: PLR0913 (what is known of a building)
             robot_m + floors.MARGIN_M
         )  # in a corner that the rectangles leave out
         rooms["start"] = ((x - half, y - half, x + half, y + half),)
+    bounds = _bounds_of(rooms)
     return Survey(
         start=start or (*spots[0], 0.0),
         goals=tuple(goals),
         rooms=rooms,
         gaps=tuple(replace(gap, at=cells.in_map(gap.at)) for gap in gaps),
         area_m2=area,
+        bounds=bounds,
+        ends=_ends(known & cells.rect(bounds), reach, built, cells, robot_m),
     )
 
 
@@ -139,6 +150,13 @@ class Cells:
     def raster(self, boxes: Float) -> NDArray[np.bool_]:
         """Which cells a box touches, (n, 5) in their frame."""
         return raster_of(boxes, self.shape, self.cell_m)
+
+    def rect(self, rect: Rect) -> NDArray[np.bool_]:
+        """Which cells lie in a rectangle along the axes of the map."""
+        a, b, c, d = rect
+        middle = np.array([0.5 * (a + c), 0.5 * (b + d), 0.0])
+        x, y, yaw = se2.compose(se2.inverse(self.T_map_cells), middle).tolist()
+        return self.raster(np.array([[x, y, 0.5 * (c - a), 0.5 * (d - b), yaw]]))
 
     def at(self, start: Pose | None) -> tuple[int, int] | None:
         """The cell of the start, or of the origin of the map frame; None where that is off the map.
@@ -183,6 +201,24 @@ class Cells:
     def _cells(self, points: Float) -> NDArray[np.int64]:
         at = se2.transform(se2.inverse(self.T_map_cells), points)
         return np.floor(at[:, ::-1] / self.cell_m).astype(np.int64)
+
+
+def _bounds_of(rooms: dict[str, tuple[Rect, ...]]) -> Rect:
+    rects = np.array([rect for own in rooms.values() for rect in own])
+    low, high = rects[:, :2].min(axis=0) - EDGE_M, rects[:, 2:].max(axis=0) + EDGE_M
+    return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _ends(known: Mask, reach: Mask, built: Mask, cells: Cells, robot_m: float) -> Float:
+    """Walls round the floor in one piece with what the robot can reach; through what is too narrow
+    no way leads."""
+    room_m = robot_m + floors.MARGIN_M
+    half_m = min(0.5 * LEAK_M, room_m)
+    wide = floors.clearance(known, cells.cell_m) >= half_m
+    _, labels = cv2.connectedComponents(wide.astype(np.uint8), connectivity=4)
+    own = wide & np.isin(labels, np.unique(labels[reach & wide]))
+    near = (_away(own) * cells.cell_m <= half_m) | (_away(reach) * cells.cell_m <= room_m)
+    return ends_of(near & known, built, cells.cell_m)
 
 
 def _inside(at: Point, rooms: dict[str, tuple[Rect, ...]]) -> bool:

@@ -28,9 +28,12 @@ def mjcf(plan: MapPlan, name: str) -> str:
         f'    <geom name="floor:all" class="floor" pos="{_n(*middle)} 0" size="{_n(*half)} 0.1"'
         ' material="floor_concrete"/>',
     ]
-    for k, (x, y, a, b, yaw) in enumerate(plan.walls.tolist()):
+    walls = [(str(k), box) for k, box in enumerate(plan.walls.tolist())]
+    for name, (x, y, a, b, yaw) in walls + [
+        (f"end{k}", box) for k, box in enumerate(plan.ends.tolist())
+    ]:
         lines.append(
-            f'    <geom name="wall:{k}" class="wall" pos="{_n(x, y, UP)}" size="{_n(a, b, UP)}"'
+            f'    <geom name="wall:{name}" class="wall" pos="{_n(x, y, UP)}" size="{_n(a, b, UP)}"'
             f' euler="0 0 {_n(math.remainder(yaw, math.pi))}"/>'
         )
     lines.append(

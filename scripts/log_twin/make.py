@@ -120,7 +120,8 @@ def housed(log: Recorded, folder: Path) -> tuple[Recorded, Path]:
         lasers = np.array([se2.compose(pose, mount) for pose in poses])
         walls, lasers = laid(drawn.walls, lasers, ranges.astype(np.float64), angles)
         poses = np.array([se2.compose(laser, se2.inverse(mount)) for laser in lasers])
-    scene = write(replace(drawn, walls=walls), folder / "building", made_of=name)
+    seen = replace(drawn, walls=walls, ends=drawn.ends[:0])  # a twin has what the log saw
+    scene = write(seen, folder / "building", made_of=name)
     return replace(log, poses=poses), scene
 
 

@@ -52,10 +52,12 @@ class Parts:
 
         with working("finding walls and rooms"):
             done = make.made(map_, how, stem, furniture=self.furniture, doors=self.doors, **more)
-        for line in make.in_words(done.plan):
+        for line in (*make.in_words(done.plan), *make.contents(done.seen.scene)):
             say(line, highlight=False)
         toml, xml, picture = done.files
         note(f"wrote {toml} (the scene's name), {xml} (walls and rooms) and {picture}")
+        for problem in done.seen.problems():
+            fact(f"{toml}: {problem}", bad=True)
 
 
 @spec
@@ -133,23 +135,16 @@ class Show:
     which: str = WHICH()
     out: Path | None = OUT()
     seed: int = options.SEED(0)
-    width: int = option("", 1600)
 
     def __call__(self) -> None:
         check_names([], self.which)
-        import scenes
-        from scripts.scene.make import contents
-        from sim.view.mapview import MapView
+        from scripts.scene.make import Seen, contents
 
-        built = scenes.build(self.which, self.seed)
-        a, b, c, d = built.bounds
-        height = max(200, min(4096, round(self.width * (d - b + 1.0) / (c - a + 0.6))))
         path = (self.out or Path(f"{file_name(Path(self.which).stem)}-seen")).with_suffix(".png")
-        view = MapView(built, self.width, height)
-        picture = view.draw([built.initial[mover.name] for mover in built.movers])
-        for line in contents(built):
+        seen = Seen(self.which, self.seed)
+        for line in contents(seen.scene):
             say(line, highlight=False)
-        _draw(path, picture)
+        note(f"wrote {seen.picture(path)}")
 
 
 @spec
@@ -164,19 +159,13 @@ class Check:
 
     def __call__(self) -> None:
         check_names([], self.which)
-        import scenes
-        from scripts.scene.make import problems
-        from sim.driving.pilot import tour_of
-        from sim.simulation import Simulation
+        from scripts.scene.make import Seen
 
-        seen = Simulation(self.which, seed=self.seed)
-        seen.observe()  # raises what ``run`` would
-        tour = tour_of(seen.world.robot)
-        found = list(problems(scenes.build(self.which, self.seed), tour.robot_radius_m))
+        found = Seen(self.which, self.seed).problems()
         for problem in found:
             fact(f"{self.which}: {problem}", bad=True)
         if found:
-            raise MobiliaError(f"{self.which}: {len(found)} things are wrong")
+            raise MobiliaError(f"{self.which}: problems found: {len(found)}")
         note(f"{self.which}: nothing is wrong")
 
 
@@ -190,29 +179,24 @@ class Kinds:
     out: Path | None = option("Also draw them all here, a PNG.", writes=True)
 
     def __call__(self) -> None:
-        from scripts.scene.make import kinds, picture
+        from scripts.scene import picture
 
-        stands, moves = kinds()
+        stands, moves = picture.kinds()
         say(f"stands: {', '.join(stands)}", highlight=False)
         say(f"can be pushed: {', '.join(moves)}", highlight=False)
         if self.out is not None:
-            _draw(self.out.with_suffix(".png"), picture())
+            import imageio.v2 as imageio
+
+            from slam.files import replacing
+
+            with replacing(path := self.out.with_suffix(".png")) as new:
+                imageio.imwrite(new, picture.kinds_picture(), format="png")
+            note(f"wrote {path}")
 
 
 SPECS = {"from-map": OfMap, "from-log": OfLog, "show": Show, "check": Check, "kinds": Kinds}
 for _name, _spec in SPECS.items():
     scene.command(_name, cls=Verb)(command(_spec))
-
-
-def _draw(path: Path, picture: Any) -> None:
-    """A PNG, whole or not at all."""
-    import imageio.v2 as imageio
-
-    from slam.files import replacing
-
-    with replacing(path) as new:
-        imageio.imwrite(new, picture, format="png")
-    note(f"wrote {path}")
 
 
 def _start(words: str | None) -> tuple[float, float, float] | None:

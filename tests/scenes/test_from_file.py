@@ -7,7 +7,8 @@ import re
 import pytest
 
 import scenes
-from scripts.scene.make import contents, problems
+from scripts.scene.check import problems
+from scripts.scene.make import contents
 from sim.simulation import Simulation
 from slam.errors import InvalidValueError, MobiliaError
 
@@ -49,7 +50,9 @@ def test_a_drawn_plan_has_what_it_says(lab):
     assert scene.initial["chair0"][:2] == (2.0, 2.8)
     assert scene.options["n_people"] == 1
     assert list(problems(scene)) == []
-    assert "stands: 1 desk, 1 door_frame" in list(contents(scene))
+    assert {
+        "stands: 2 (1 desk, 1 door_frame)", "can move: 4 (2 chair_swivel, 1 door, 1 person)",
+    } <= set(contents(scene))  # fmt: skip
 
 
 def test_seats_that_come_with_a_table_are_optional(lab):
@@ -69,13 +72,49 @@ def test_seats_that_come_with_a_table_are_optional(lab):
         (
             "[0, 5], [0, 0]]",
             "[0, 5], [0, 1.2]]",
-            r"gap to nowhere: 1\.[012] m wide, at \(0\.0., 0\.[56]",
+            r"gap to nowhere: 1\.[012] m wide, at \(0\.0., 0\.[56]\d\), beside "
+            r".*lab\.toml: walls\[0\] from \(0, 0\) to \(8, 0\) and .*walls\[0\] from \(0, 5\)",
+        ),
+        (
+            "[[4, 2.98], [4, 5]]",
+            "[[4, 2], [4, 5]]",
+            r"1[678] m2 of floor about \([5-7]\..*, with goals 1, .*: .*lab\.toml: "
+            r"walls\[[12]\] from \(4, .*shuts it off",
+        ),
+        (
+            "[[4, 2.98], [4, 5]]",
+            "[[4, 2.5], [4, 5]]",
+            r"with goals 1, .* 0\.[34]\d m wide at \([34].*, 2\..*'door_frame0'.* needs 0\.57 m",
         ),
     ],
 )
 def test_check_names_what_is_wrong(lab, was, is_, says):
-    found = list(problems(scenes.build(lab(LAB.replace(was, is_)))))
+    name = lab(LAB.replace(was, is_))
+    found = list(problems(scenes.build(name), which=name))
     assert any(re.search(says, line) for line in found), found
+
+
+def test_check_names_the_geom_or_furniture_that_shuts_off_a_room(tmp_path):
+    plan = tmp_path / "shed.xml"
+    lines = [
+        '<geom name="wall:mid" class="wall" pos="0 0 0.55" size="0.1 {} 0.55"/>',
+        *(f'<site name="rack_a:a:{k}" pos="0 {y} 0" euler="0 0 1.5708"/>' for k, y in enumerate(
+            (-1.2, 1.2))),
+    ]  # fmt: skip
+    walls = "".join(
+        f'<geom name="wall:{k}" class="wall" pos="{x} {y} 0.55" size="{a} {b} 0.55"/>'
+        for k, (x, y, a, b) in enumerate(
+            [(0, 2.1, 3.2, 0.1), (0, -2.1, 3.2, 0.1), (3.1, 0, 0.1, 2), (-3.1, 0, 0.1, 2)]
+        )
+    )
+    marks = (
+        '<site name="room:a" type="box" size="3 2 0.01"/><site name="start:robot" pos="-2 0 0"/>'
+    )
+    for middle, says in ((lines[:1], r"shed\.xml: geom 'wall:mid'"), (lines[1:], "'rack_a[01]'")):
+        text = "".join(middle).format(2)
+        plan.write_text(f"<mujoco><worldbody>{walls}{text}{marks}</worldbody></mujoco>")
+        found = [line for line in problems(scenes.build(str(plan))) if "of floor about" in line]
+        assert re.search(rf"{says}.* shuts it off|beside .*{says}", found[0]), found
 
 
 def test_a_seat_of_an_unknown_kind_is_named_before_anything_runs(tmp_path):

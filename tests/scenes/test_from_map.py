@@ -13,7 +13,8 @@ import pytest
 import scenes
 from scenes.from_map import FromMap, plan, write
 from scenes.placement import gap_to_boxes
-from scripts.scene.make import of_file, problems
+from scripts.scene.check import problems
+from scripts.scene.make import of_file
 from scripts.scene.robot import robot_of
 from sim.driving.pilot import tour_of
 from sim.simulation import Simulation
@@ -93,6 +94,15 @@ def test_rooms_and_spots_lie_on_free_floor_also_of_a_turned_map():
     columns, rows = np.floor(se2.transform(back, np.array(spots)) / CELL).astype(int).T
     assert (raster.values[rows, columns] == 0.0).all()
     assert made.figures.rooms_m2 > 0.7 * WIDE * HIGH
+
+
+def test_a_floor_that_ends_without_a_wall_is_shut_off(tmp_path):
+    made = plan(two_rooms(math.radians(15.0), hole=True))
+    assert 2.0 * made.ends[:, 2].sum() == pytest.approx(30 * CELL, rel=0.3)
+    assert list(problems(scenes.build(str(write(made, tmp_path / "lab"))))) == []
+    bare = write(replace(made, ends=made.ends[:0]), tmp_path / "bare")
+    assert "gap to nowhere: 1.4 m wide" in " ".join(problems(scenes.build(str(bare))))
+    assert len(plan(two_rooms()).ends) == 0
 
 
 def test_what_a_robot_drove_through_is_no_thing():

@@ -35,7 +35,8 @@ from scripts.comparison.run_file import RunFile
 from scripts.comparison.schema import TABLES
 from scripts.comparison.tables import read_csv
 from scripts.output import read_recipe_words
-from scripts.scene.make import of_file, problems
+from scripts.scene.check import problems
+from scripts.scene.make import of_file
 from sim.core import state
 from sim.recording.dataset import read_plan
 from sim.recording.recipe import read_recipe
