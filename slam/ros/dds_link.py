@@ -2,13 +2,18 @@
 """Topics of ROS 2 over DDS, by Cyclone DDS: what its rmw and that of Fast DDS speak.
 
 A topic "/scan" is "rt/scan" there, its type "sensor_msgs::msg::dds_::LaserScan_". Types are made of
-the definitions that ``slam.ros.template`` serialises by; the bytes go through as they are.
+the definitions that ``slam.ros.template`` serialises by; the bytes go through as they are. Names of
+fields are ROS's own: Cyclone DDS matches no reader that names one otherwise.
 """
 
 import os
-import time
+import socket
+import struct
+from contextlib import suppress
 from functools import cache
+from threading import Thread
 from typing import Any
+from weakref import WeakValueDictionary, finalize
 
 import cyclonedds.idl.types as of
 from cyclonedds._clayer import ddspy_take, ddspy_write
@@ -41,27 +46,49 @@ _BASES: dict[str, Any] = {
 _ANY = SampleState.Any | ViewState.Any | InstanceState.Any
 _UNREAD = SampleState.NotRead | ViewState.Any | InstanceState.Any
 _MOST = 1000  # messages taken at once
-# As ROS does it for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST: found by asking each port in turn.
+# Of this machine only: what we send has the loopback's address, which nothing routes further.
 _ALONE = (
     "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='127.0.0.1'/></Interfaces>"
-    "<AllowMulticast>spdp</AllowMulticast></General><Discovery><ParticipantIndex>auto"
-    "</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex>"
-    "<Peers><Peer address='127.0.0.1'/></Peers></Discovery></Domain></CycloneDDS>"
+    "<AllowMulticast>false</AllowMulticast></General><Discovery><ParticipantIndex>auto"
+    "</ParticipantIndex><MaxAutoParticipantIndex>32</MaxAutoParticipantIndex><SPDPInterval>0.25s"
+    "</SPDPInterval><Peers><Peer address='127.0.0.1'/>"  # each port in turn, as for LOCALHOST
+    "<Peer address='127.0.0.1:{}' PruneDelay='inf'/></Peers></Discovery></Domain></CycloneDDS>"
 )
-_domains: dict[int, Domain] = {}
+_GROUP = "239.255.0.1"  # where participants with default settings listen for others
+_domains: WeakValueDictionary[int, Domain] = WeakValueDictionary()  # those of ``_ALONE``
 
 
-def open_link(domain: int, namespace: str, _router: int) -> "DdsLink":
+def open_link(number: int, namespace: str, _router: int) -> "DdsLink":
     """A participant; other machines are seen where ``open_to_others`` or CYCLONEDDS_URI says so."""
-    if domain not in _domains and "CYCLONEDDS_URI" not in os.environ and not open_to_others():
-        _domains[domain] = Domain(domain, _ALONE)
-    return DdsLink(domain, namespace)
+    domain = _domains.get(number)
+    if domain is None and "CYCLONEDDS_URI" not in os.environ and not open_to_others():
+        inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
+        inbox.bind(("127.0.0.1", 0))
+        domain = _domains[number] = Domain(number, _ALONE.format(inbox.getsockname()[1]))
+        Thread(target=_repeat, args=(inbox, 7400 + 250 * number), daemon=True).start()
+        finalize(domain, inbox.sendto, b"", inbox.getsockname())
+    return DdsLink(number, namespace, domain)
+
+
+def _repeat(inbox: socket.socket, port: int) -> None:
+    """Send what comes to all who listen to others at ``port`` on this machine, until b"" comes.
+
+    It goes by every interface, with as many hops to live as keep it here: none.
+    """
+    with inbox, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as outbox:
+        outbox.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
+        while packet := inbox.recv(1 << 16):
+            for index, _ in socket.if_nameindex():
+                by = struct.pack("8xi", index)  # ip_mreqn
+                with suppress(OSError):  # one that is down
+                    outbox.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_IF, by)
+                    outbox.sendto(packet, (_GROUP, port))
 
 
 @cache
 def _kind(name: str) -> Any:
     """The type of that name."""
-    fields = {f"{field}_": _field(how) for field, how in STORE.fielddefs[name][1]}
+    fields = {field: _field(how) for field, how in STORE.fielddefs[name][1]}
     return make_idl_struct(type_name(name), type_name(name).replace("::", "."), fields)
 
 
@@ -87,10 +114,11 @@ def _qos(topic: Topic) -> Qos:
 
 
 class DdsLink:
-    """One participant."""
+    """One participant; ``domain``, where there is one, lives as long as those in it."""
 
-    def __init__(self, domain: int, namespace: str) -> None:
-        self._participant, self._namespace = DomainParticipant(domain), namespace
+    def __init__(self, number: int, namespace: str, domain: Domain | None) -> None:
+        self._domain, self._participant = domain, DomainParticipant(number)
+        self._namespace = namespace
         self._writers: dict[Topic, DataWriter[Any]] = {}
         self._readers: dict[Topic, DataReader[Any]] = {}
         self._waits = WaitSet(self._participant)
@@ -135,10 +163,7 @@ class DdsLink:
 
     def wait(self, timeout_s: float) -> None:
         """Until something has come, or for so long."""
-        if self._conditions:
-            self._waits.wait(max(0, round(timeout_s * 1e9)))
-        else:
-            time.sleep(timeout_s)
+        self._waits.wait(max(0, round(timeout_s * 1e9)))
 
     def listeners(self, topic: Topic) -> int:
         """How many readers there are."""
@@ -149,4 +174,4 @@ class DdsLink:
         self._waits, self._conditions = WaitSet(self._participant), []
         self._readers.clear()
         self._writers.clear()
-        del self._waits, self._participant
+        del self._waits, self._participant, self._domain

@@ -22,11 +22,11 @@ STATE = (  # in the order of a bag's connections
     Topic(name=BEGAN, kind=ros.BeganMessage.KIND, **_LATCHED),
     Topic(name="/clock", kind=ros.ClockMessage.KIND, reliable=False, depth=1),
     Topic(name="/map", kind=ros.MapMessage.KIND, **_LATCHED),
-    Topic(name="/initialpose", kind=ros.StartMessage.KIND),
+    Topic(name="/initialpose", kind=ros.PoseMessage.KIND),
     Topic(name="/tf_static", kind=ros.TransformMessage.KIND, **_LATCHED),
     Topic(name="/tf", kind=ros.TransformMessage.KIND, depth=100),
     Topic(name="/odom", kind=ros.OdometryMessage.KIND),
-    Topic(name="/odom_increment", kind=ros.IncrementMessage.KIND),
+    Topic(name="/odom_increment", kind=ros.PoseMessage.KIND),
     Topic(name="/ground_truth/pose", kind=ros.TruthMessage.KIND),
     Topic(name="/ground_truth/tf", kind=ros.TransformMessage.KIND),
 )
@@ -67,7 +67,7 @@ class _Wheels:
     """/odom, /tf and /odom_increment of one frame after another."""
 
     def __init__(self) -> None:
-        self.odometry, self.increment = ros.OdometryMessage(), ros.IncrementMessage()
+        self.odometry, self.increment = ros.OdometryMessage(), ros.PoseMessage()
         self.tf = ros.TransformMessage((ros.ODOM, ros.FOOTPRINT, 0.0))
         self._covariance, self._known = np.zeros((3, 3)), True
         self._last: Odometry | None = None
@@ -89,24 +89,6 @@ class _Wheels:
             self.tf(now.stamp_ns, now.T_odom_robot),
             None if spread is None else self.increment(now.stamp_ns, step, spread),
         )
-
-
-class _Truth:
-    """/ground_truth/pose and /ground_truth/tf of one frame after another."""
-
-    def __init__(self) -> None:
-        self._pose = ros.TruthMessage()
-        self._links = ros.TransformMessage(
-            (ros.WORLD, ros.MAP, 0.0), (ros.MAP, ros.ODOM, 0.0),
-            (ros.WORLD, ros.TRUE_FOOTPRINT, 0.0),
-        )  # fmt: skip
-
-    def next(self, T_world_robot: Float, odometry: Odometry) -> tuple[bytearray, bytearray]:
-        """map -> odom is what a SLAM without error would say."""
-        stamp_ns = odometry.stamp_ns
-        T_map_odom = se2.compose(T_world_robot, se2.inverse(odometry.T_odom_robot))
-        links = self._links(stamp_ns, se2.IDENTITY, T_map_odom, T_world_robot)
-        return self._pose(stamp_ns, T_world_robot), links
 
 
 def place_of(number: int) -> str:
@@ -170,7 +152,11 @@ class FrameMessages:
         ]
         lasers = [(ros.ROBOT, ros.LASER + place_of(k), height_m) for k in range(len(self._specs))]
         self._mount = ros.TransformMessage((ros.FOOTPRINT, ros.ROBOT, 0.0), *lasers)
-        self._wheels, self._truth, self._clock = _Wheels(), _Truth(), ros.ClockMessage()
+        self._wheels, self._clock, self._truth = _Wheels(), ros.ClockMessage(), ros.TruthMessage()
+        self._true = ros.TransformMessage(
+            (ros.WORLD, ros.MAP, 0.0), (ros.MAP, ros.ODOM, 0.0),
+            (ros.WORLD, ros.TRUE_FOOTPRINT, 0.0),
+        )  # fmt: skip
         self._map = None if static_map is None else ros.MapMessage(static_map)
 
     def begin(self, frame: Frame) -> Iterator[Message]:
@@ -183,7 +169,8 @@ class FrameMessages:
         if self._map is not None:
             yield Message("/map", stamp_ns, self._map(stamp_ns))
         if frame.truth is not None:
-            yield Message("/initialpose", stamp_ns, ros.StartMessage()(stamp_ns, frame.truth))
+            start = ros.PoseMessage(ros.MAP)(stamp_ns, frame.truth, ros.START_COVARIANCE)
+            yield Message("/initialpose", stamp_ns, start)
 
     def state(self, frame: Frame) -> Iterator[Message]:
         """Clock, odometry and truth of a frame."""
@@ -194,9 +181,10 @@ class FrameMessages:
         yield Message("/odom", stamp_ns, odometry)
         if increment is not None:
             yield Message("/odom_increment", stamp_ns, increment)
-        if frame.truth is not None:
-            truth, links = self._truth.next(frame.truth, frame.odometry)
-            yield Message("/ground_truth/pose", stamp_ns, truth)
+        if frame.truth is not None:  # map -> odom is what a SLAM without error would say
+            T_map_odom = se2.compose(frame.truth, se2.inverse(frame.odometry.T_odom_robot))
+            links = self._true(stamp_ns, se2.IDENTITY, T_map_odom, frame.truth)
+            yield Message("/ground_truth/pose", stamp_ns, self._truth(stamp_ns, frame.truth))
             yield Message("/ground_truth/tf", stamp_ns, links)
 
     def scans(self, *frames: Frame) -> Iterator[Message]:

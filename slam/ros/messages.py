@@ -24,7 +24,7 @@ from slam.ros.template import Marks, Template, header, marked_time, message
 
 UNKNOWN_CELL = -1  # nav_msgs/OccupancyGrid
 # What RViz sends for "2D Pose Estimate": (0.5 m)^2 and (15 degrees)^2.
-_START_VARIANCES = {0: 0.25, 7: 0.25, 35: 0.06853891909122467}
+START_COVARIANCE = np.diag([0.25, 0.25, 0.06853891909122467])
 
 
 class ClockMessage:
@@ -80,21 +80,6 @@ class MapMessage:
     def __call__(self, stamp_ns: int) -> bytearray:
         """The map, loaded at that time."""
         return Template(self.KIND, self._prototype).stamp(stamp_ns)
-
-
-class StartMessage:
-    """geometry_msgs/PoseWithCovarianceStamped: where the robot truly starts, on the map."""
-
-    KIND = "geometry_msgs/msg/PoseWithCovarianceStamped"
-
-    def __call__(self, stamp_ns: int, T_map_robot: Float) -> bytearray:
-        """As RViz sends it for a click on the map."""
-        pose = np.zeros(7 + 36)
-        fill_pose(pose[:7], T_map_robot)
-        for place, variance in _START_VARIANCES.items():
-            pose[7 + place] = variance
-        prototype = message(self.KIND, header=header(MAP), pose=pose)
-        return Template(self.KIND, prototype).stamp(stamp_ns)
 
 
 WORLD, MAP, ODOM = "world", "map", "odom"
@@ -244,10 +229,10 @@ class OdometryMessage:
         return self._template.stamp(odometry.stamp_ns)
 
 
-class IncrementMessage:
-    """geometry_msgs/PoseWithCovarianceStamped: the motion since the frame before, in its frame.
+class PoseMessage:
+    """geometry_msgs/PoseWithCovarianceStamped: a pose in ``frame``.
 
-    Or, with another ``frame``, a pose in that.
+    In the robot's it is the motion since the frame before.
     """
 
     KIND = "geometry_msgs/msg/PoseWithCovarianceStamped"
@@ -260,9 +245,9 @@ class IncrementMessage:
         view[:] = 0.0
         self._pose, self._spread = view[:7], view[7:]
 
-    def __call__(self, stamp_ns: int, T_previous_robot: Float, covariance: Float) -> bytearray:
-        """The covariance (3, 3) is in the previous robot frame."""
-        fill_pose(self._pose, T_previous_robot)
+    def __call__(self, stamp_ns: int, pose: Float, covariance: Float) -> bytearray:
+        """The covariance (3, 3) is in that frame, too."""
+        fill_pose(self._pose, pose)
         self._spread[_PLANAR] = covariance.ravel()
         return self._template.stamp(stamp_ns)
 

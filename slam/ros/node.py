@@ -23,7 +23,7 @@ from slam.logs.bag_laser import PoseTrack, Stamped, stamp_of
 from slam.logs.bag_tf import planar_of
 from slam.logs.ros_numbers import MOST_POSE_M, planar
 from slam.ros.link import Link, Topic
-from slam.ros.messages import MAP, ODOM, MapMessage, StartMessage, TransformMessage
+from slam.ros.messages import MAP, ODOM, MapMessage, PoseMessage, TransformMessage
 from slam.ros.template import STORE
 
 MOST_CELLS = 1 << 26  # of a map: a square of 400 m at 5 cm
@@ -92,7 +92,7 @@ CLOCK_NS = 60 * NS_PER_S  # a stamp so far from the scan's is of another clock
 _KEPT_NS = 10 * NS_PER_S  # of odometry, that a late pose may refer to
 TF = Topic(name="/tf", kind=TransformMessage.KIND, depth=200)
 GRID = Topic(name="/map", kind=MapMessage.KIND, latched=True, depth=1)
-POSES = tuple(Topic(name=name, kind=StartMessage.KIND) for name in ("/pose", "/amcl_pose"))
+POSES = tuple(Topic(name=name, kind=PoseMessage.KIND) for name in ("/pose", "/amcl_pose"))
 _log = logging.getLogger(__name__)
 
 

@@ -1,11 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """A robot on the network: frames go out as its drivers would send them."""
 
+from collections.abc import Iterator
 from dataclasses import replace
+from itertools import chain
 
 from slam.estimate import Raster
 from slam.frames import Frame
-from slam.ros.frames import SCANS, STATE, FrameMessages
+from slam.ros.frames import SCANS, STATE, FrameMessages, Message
 from slam.ros.link import Link, Topic
 
 _RENAMED = {"/map": "/ground_truth/map"}  # "/map" is the SLAM's
@@ -55,7 +57,7 @@ class Robot:
 
         Nothing before the first scan, which says what scanner it is.
         """
-        scan, messages = frame.scan, self._messages
+        scan, messages, said = frame.scan, self._messages, list[Iterator[Message]]()
         if messages is None:
             if scan is None:
                 return
@@ -65,14 +67,10 @@ class Robot:
                 static_map=self._map,
                 intensities=scan.intensities is not None,
             )
-            for topic, _, data in messages.begin(frame):
-                self._put(topic, data)
-        for topic, _, data in messages.state(frame):
-            self._put(topic, data)
+            said.append(messages.begin(frame))
+        said.append(messages.state(frame))
         if scan is not None:
-            for topic, _, data in messages.scans(frame):
-                self._put(topic, data)
-
-    def _put(self, topic: str, data: bytearray) -> None:
-        if topic in self.topics:
-            self._link.publish(self.topics[topic], bytes(data))
+            said.append(messages.scans(frame))
+        for topic, _, data in chain(*said):
+            if topic in self.topics:
+                self._link.publish(self.topics[topic], bytes(data))

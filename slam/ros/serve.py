@@ -26,7 +26,7 @@ from slam.logs.bag_laser import Laser, stamp_of
 from slam.logs.bag_tf import MOST_TRANSFORMS, mounting
 from slam.logs.bag_topics import Topics
 from slam.ros.link import Link, Topic, open_link
-from slam.ros.messages import MAP, ODOM, IncrementMessage, MapMessage, TransformMessage
+from slam.ros.messages import MAP, ODOM, MapMessage, PoseMessage, TransformMessage
 from slam.ros.node import GRID, POSES, TF, decoded
 from slam.ros.robot import topics
 from slam.ros.template import EPOCH_NS
@@ -53,7 +53,7 @@ class Served:
             link.subscribe(topic)
         for topic in (_TF, _POSE, _MAP):
             link.advertise(topic)
-        self._tf, self._pose = TransformMessage((MAP, ODOM, 0.0)), IncrementMessage(MAP)
+        self._tf, self._pose = TransformMessage((MAP, ODOM, 0.0)), PoseMessage(MAP)
         self._links: dict[tuple[str, str], Any] = {}
         self._waiting: dict[Topic, list[Any]] = {topic: [] for topic in _HEARD}
         self._assembly: Assembly | None = None

@@ -184,10 +184,7 @@ class ZenohLink:
 
     def listeners(self, topic: Topic) -> int:
         """1 where somebody listens."""
-        publisher = self._publisher(topic)[0]
-        if not hasattr(publisher, "matching_status"):
-            return 1
-        return int(publisher.matching_status.matching)
+        return int(self._publisher(topic)[0].matching_status.matching)
 
     def close(self) -> None:
         """Leave the network."""

@@ -17,7 +17,7 @@ from sim.moments import Moment
 from sim.recording.bag import BagWriter
 from sim.simulation import Simulation
 from slam.ros.link import MIDDLEWARES, Taken, open_link
-from slam.ros.messages import StartMessage
+from slam.ros.messages import PoseMessage
 from slam.ros.node import TF, decoded, transform_of
 from slam.ros.serve import Served
 from slam.ros.slam import Domain
@@ -52,7 +52,7 @@ def word(text: str) -> Taken:
 
 def test_messages_are_what_a_page_may_ask_for(network):
     network, link = network
-    there = StartMessage()(0, np.array([1.0, 2.0, 0.5]))
+    there = PoseMessage()(0, np.array([1.0, 2.0, 0.5]), np.eye(3))
     link.come |= {
         "/cmd_vel": [twist(9.0), twist(0.3, 0.1)],
         "/initialpose": [Taken(bytes(there), "a")],

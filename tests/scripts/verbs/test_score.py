@@ -12,7 +12,7 @@ from rosbags.rosbag2 import StoragePlugin, Writer
 from sim.moments import Moment
 from sim.recording.bag import VERSION, BagWriter
 from slam import se2
-from slam.ros.messages import MAP, ODOM, IncrementMessage, TransformMessage
+from slam.ros.messages import MAP, ODOM, PoseMessage, TransformMessage
 from slam.ros.recorded import read_statements
 from slam.ros.template import EPOCH_NS, STORE
 from tests.slam.ros.frames import SPEC, driven
@@ -108,7 +108,7 @@ def test_another_clock_is_named_and_can_be_aligned(called, ours, tmp_path):
 
 
 def test_poses_that_cannot_be_are_left_out_and_told_once(ours, tmp_path, caplog):
-    say, spread = IncrementMessage(MAP), np.diag([0.01, 0.02, 0.03])
+    say, spread = PoseMessage(MAP), np.diag([0.01, 0.02, 0.03])
     with Writer(tmp_path / "b", version=VERSION, storage_plugin=StoragePlugin.MCAP) as bag:
         connection = bag.add_connection("/amcl_pose", say.KIND, typestore=STORE)
         for k, frame in enumerate(FRAMES):

@@ -9,15 +9,18 @@ from contextlib import contextmanager
 from slam.ros.link import Link, open_link
 from slam.ros.slam import Domain
 
+ANYWHERE = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}  # what ROS does by default
 PREFIXES = {"dds": "ros2", "zenoh": "ros2-zenoh"}  # of SLAMs
 
 
 @contextmanager
-def started(words: Sequence[object], domain: Domain) -> Iterator[subprocess.Popen[str]]:
+def started(
+    words: Sequence[object], domain: Domain, **environment: str
+) -> Iterator[subprocess.Popen[str]]:
     """A client that listens, until it is let go."""
     out = {"stdout": subprocess.PIPE, "text": True}
-    child = subprocess.Popen([*map(str, words)], env={**os.environ, **domain.environment()}, **out)
-    with child:
+    inherited = {**os.environ, **domain.environment(), **environment}
+    with subprocess.Popen([*map(str, words)], env=inherited, **out) as child:
         assert child.stdout.readline() == "ready\n"
         try:
             yield child

@@ -29,8 +29,10 @@ int main(int argc, char** argv)
     const char* domain = std::getenv("ROS_DOMAIN_ID");
     const char* own_ip = std::getenv("NODE_IP");  // and that of the robot, where they are not the loopback's
     const char* robot_ip = std::getenv("ROBOT_IP");
+    const char* range = std::getenv("ROS_AUTOMATIC_DISCOVERY_RANGE");
     DomainParticipantQos own;
-    {   // as rmw_fastrtps does for ROS_AUTOMATIC_DISCOVERY_RANGE=LOCALHOST
+    if (own_ip || (range && std::string(range) == "LOCALHOST"))
+    {   // as rmw_fastrtps does for it; else default settings
         auto udp = std::make_shared<eprosima::fastdds::rtps::UDPv4TransportDescriptor>();
         udp->interfaceWhiteList.push_back(own_ip ? own_ip : "127.0.0.1");
         udp->maxInitialPeersRange = 32;

@@ -5,6 +5,7 @@ import os
 import shlex
 import shutil
 import subprocess
+import sys
 import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
@@ -29,6 +30,19 @@ from tests.slam.ros.frames import driven
 HZ = 37.5
 CUT_S = 5.0
 ANSWERS = replace(TF, depth=1000)
+BY = (
+    "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='{}'/></Interfaces>"
+    "</General><Discovery>{}</Discovery></Domain></CycloneDDS>"
+)
+SEES = """
+import sys, time
+from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
+from cyclonedds.domain import DomainParticipant
+participant = DomainParticipant(int(sys.argv[1]))
+reader = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
+time.sleep(2.5)
+print(*(found.topic_name for found in reader.take(100)))
+"""  # as ros2 topic list does
 pytestmark = pytest.mark.slow
 
 
@@ -78,8 +92,8 @@ def test_of_many_that_speak_only_the_first_that_makes_sense_is_believed(client, 
 
 
 @pytest.fixture
-def cable(monkeypatch) -> Iterator[tuple[list[str], str, Callable[[str], None]]]:
-    """A network namespace: words that start a program in it, our address, and a switch."""
+def cable() -> Iterator[tuple[list[str], str, str, Callable[[str], None]]]:
+    """Another machine: words that start a program on it, our address, its address, and a switch."""
     pid = os.getpid()
     space, ours, theirs = f"mobilia{pid}", f"mob{pid}a", f"mob{pid}b"
     inside = ["ip", "netns", "exec", space]
@@ -98,19 +112,39 @@ def cable(monkeypatch) -> Iterator[tuple[list[str], str, Callable[[str], None]]]
         )),
     ):  # fmt: skip
         subprocess.run(line.split(), check=True)
-    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
-    monkeypatch.setenv("CYCLONEDDS_URI", (
-        "<CycloneDDS><Domain><General><Interfaces><NetworkInterface address='"
-        f"{here}'/></Interfaces></General></Domain></CycloneDDS>"
-    ))  # fmt: skip
-    monkeypatch.setenv("NODE_IP", there)
-    monkeypatch.setenv("ROBOT_IP", here)
-    yield inside, here, lambda how: subprocess.run(["ip", "link", "set", ours, how], check=True)
+    yield (
+        inside,
+        here,
+        there,
+        lambda how: subprocess.run(["ip", "link", "set", ours, how], check=True),
+    )
     subprocess.run(["ip", "netns", "del", space], check=True)
 
 
+@pytest.mark.parametrize(
+    ("asks", "sees"), [("", False), ("<Peers><Peer address='{}'/></Peers>", False), ("", True)]
+)
+def test_another_machine_sees_the_robot_where_it_may(cable, asks, sees, monkeypatch):
+    pytest.importorskip("cyclonedds", reason="needs the extra ros2")
+    inside, here, there, _ = cable
+    if sees:
+        monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+        monkeypatch.setenv("CYCLONEDDS_URI", BY.format(here, ""))
+    with on("dds") as (domain, link):
+        looks = [sys.executable, "-c", SEES, str(domain.number)]
+        Robot(link)
+        out = {"check": True, "stdout": subprocess.PIPE, "text": True}
+        assert "rt/scan " in subprocess.run(looks, **out).stdout
+        monkeypatch.setenv("CYCLONEDDS_URI", BY.format(there, asks.format(here)))
+        assert ("rt/scan " in subprocess.run([*inside, *looks], **out).stdout) == sees
+
+
 def test_a_cut_of_five_seconds_holds_nothing_up_and_scans_flow_again(client, cable, monkeypatch):
-    (middleware, words), (inside, here, switch) = client, cable
+    (middleware, words), (inside, here, there, switch) = client, cable
+    monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
+    monkeypatch.setenv("CYCLONEDDS_URI", BY.format(here, ""))
+    monkeypatch.setenv("NODE_IP", there)
+    monkeypatch.setenv("ROBOT_IP", here)
     with on(middleware) as (domain, link):
         monkeypatch.setattr(type(domain), "environment", lambda domain: {
             "ROS_DOMAIN_ID": str(domain.number),

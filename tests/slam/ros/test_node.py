@@ -17,8 +17,8 @@ from slam.ros.messages import (
     MAP,
     ODOM,
     ClockMessage,
-    IncrementMessage,
     MapMessage,
+    PoseMessage,
     TransformMessage,
 )
 from slam.ros.node import GRID, POSES, TF, Node, StampedPose, decoded
@@ -95,7 +95,7 @@ def test_a_pose_is_an_answer_and_states_the_covariance(node):
     node, link = node
     node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
     spread = np.diag([0.01, 0.02, 0.03])
-    pose = IncrementMessage(MAP)(FIRST.stamp_ns, np.array([1.0, 2.0, 0.0]), spread)
+    pose = PoseMessage(MAP)(FIRST.stamp_ns, np.array([1.0, 2.0, 0.0]), spread)
     link.come[POSES[0].name] = [Taken(bytes(pose), "a")]
     assert node.answered()
     assert node.estimate().T_map_robot == pytest.approx(np.zeros(3), abs=1e-15)
@@ -118,7 +118,7 @@ def test_a_pose_is_an_answer_and_states_the_covariance(node):
 def test_a_pose_whose_covariance_cannot_be_is_counted_and_left_out(node, spread, caplog):
     node, link = node
     node.sent(FIRST.odometry, said_ns(FIRST.stamp_ns))
-    say = IncrementMessage(MAP)
+    say = PoseMessage(MAP)
     whole = np.diag([0.01, 0.02, 0.03])
     for cov in (whole, spread, spread):
         pose = say(FIRST.stamp_ns, np.array([1.0, 2.0, 0.0]), cov)
