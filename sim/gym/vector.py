@@ -44,8 +44,8 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     episode ignores that room's action and returns its reset observation with reward 0; drop that
     transition when learning. "same_step": the ending step already returns the observation of the
     new episode, the last one of the old is in ``infos["final_obs"][i]``. "disabled": stepping a
-    room that has ended is an error. A room that resets by itself goes on with its own generator,
-    and without options.
+    room that has ended is an error, ``reset`` with a ``reset_mask`` comes first. A room that resets
+    by itself goes on with its own generator, and without options.
 
     ### Infos
     ``pose`` (n, 3), ``goal`` (n, 2) and ``goal_distance`` (n,) NaN without a goal,
@@ -75,8 +75,6 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         whole("num_envs", num_envs, 1, MOST_ENVS)
         whole("n_workers", n_workers, 0, MOST_WORKERS)
         shaped("frames", frames, bool)
-        if "n_threads" in settings:
-            raise InvalidValueError("n_threads is gone: n_workers=2 steps the rooms in 2 processes")
         source = settings.get("pose_source")
         if num_envs > 1 and source is not None and not isinstance(source, str):
             raise InvalidValueError(
@@ -176,8 +174,11 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         self._refuse_closed()
         if not self._begun.all():
             raise ResetNeededError("call reset() before using the environment")
-        if self.mode == AutoresetMode.DISABLED and board["ends"].any():
-            raise ResetNeededError(f"reset first: {np.flatnonzero(board['ends'].any(axis=1))}")
+        if self.mode == AutoresetMode.DISABLED and (ended := board["ends"].any(axis=1)).any():
+            raise ResetNeededError(
+                f"rooms {np.flatnonzero(ended).tolist()} have ended: reset(options={{'reset_mask': "
+                "terminated | truncated}), or make them with autoreset_mode='next_step'"
+            )
         board["command"] = commands
         self._show(self._rooms.step())
         terminated, truncated = board["ends"].T.copy()

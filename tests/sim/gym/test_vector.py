@@ -87,7 +87,7 @@ def test_a_mask_resets_some_rooms_and_disabled_means_disabled():
     for k in range(2):
         _, _, _, truncated, _ = many.step(actions(k))
     assert truncated.all()
-    with pytest.raises(gymnasium.error.ResetNeeded):
+    with pytest.raises(gymnasium.error.ResetNeeded, match=r"rooms \[0, 1, 2\] have ended: .*_mask"):
         many.step(actions(0))
     mask = np.array([True, False, True])
     seen, _ = many.reset(seed=[7, None, 9], options={"reset_mask": mask})

@@ -76,8 +76,6 @@ def test_rooms_that_are_closed_say_so_with_workers_and_without():
         for asked in (lambda many=many: many.reset(seed=1), lambda many=many: many.step(STILL)):
             with pytest.raises(RoomsEndedError, match="closed"):
                 asked()
-    with pytest.raises(InvalidValueError, match="n_workers"):
-        MobiliaVectorEnv(2, n_threads=2, scene="arena")
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
