@@ -1,8 +1,10 @@
 # SPDX-License-Identifier: Apache-2.0
 """A dataset as a whole: the episodes that are missing, on all processes, with a progress bar."""
 
+import json
+import re
 import time
-from collections.abc import Callable
+from collections.abc import Callable, Iterator
 from functools import partial
 from itertools import count, product
 from pathlib import Path
@@ -13,15 +15,22 @@ from rich.table import Table
 
 from scripts import interrupt, workers
 from scripts.console import note, plain_table, progress
+from scripts.formats import MINARI, write_beside
 from scripts.options import rate_hz
 from scripts.pace import Work, learn
 from sim.recording.dataset import Dataset, Plan, writing
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
+from sim.recording.splits import part_of
+from sim.recording.sums import write_sums
+from slam.files import part_of as part_folder
+from slam.files import put
 
 
 def carry_out(plan: Plan, out: Path, *, jobs: int = 1, cluster: str | None = None) -> Table:
     """Make what is missing of the dataset in ``out``; a table of what it has then."""
+    if plan.format == MINARI:
+        return _offline(plan, out, {"jobs": jobs, "cluster": cluster})
     with writing(out, plan) as dataset:
         missing, notes = dataset.missing()
         for line in notes:
@@ -51,7 +60,7 @@ def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | Non
                 bar.advance(task, 25.0 / rate)
 
         alone = cluster is None and (jobs == 1 or len(missing) < 2)
-        call = partial(_one, dataset.path, frame if alone else None)
+        call = partial(_one, dataset.path, dataset.plan.format, frame if alone else None)
         ways: dict[str, Any] = {"jobs": jobs, "cluster": cluster, "shared": dataset.path}
         for done, spent in enumerate(workers.each(call, missing, **ways), 1):
             interrupt.check()
@@ -61,10 +70,13 @@ def _make(dataset: Dataset, missing: list[Recipe], jobs: int, cluster: str | Non
                 learn([spent])
 
 
-def _one(folder: Path, note_frame: Callable[[], None] | None, recipe: Recipe) -> tuple[Work, float]:
+def _one(
+    folder: Path, form: str, note_frame: Callable[[], None] | None, recipe: Recipe
+) -> tuple[Work, float]:
     """A job, here or in a worker: what it was, and s that it took."""
     started = time.perf_counter()
-    record(recipe, folder, note=note_frame or (lambda: None))
+    beside = partial(write_beside, form) if form else (lambda episode: None)
+    record(recipe, folder, note=note_frame or (lambda: None), beside=beside)
     return Work(f"generate {recipe.scene}", recipe.seconds), time.perf_counter() - started
 
 
@@ -98,3 +110,62 @@ def _row(folders: list[Path]) -> list[str]:
         *(f"{100.0 * count / max(sum(returns), 1):.1f} %" for count in returns),
         f"{size / 1e6:.1f}",
     ]
+
+
+AT_ONCE = 64  # drives that are held until those before them are written
+
+
+def rooms_of(plan: Plan) -> dict[str, list[Recipe]]:
+    """By name, the datasets of Minari: one for each scene, dynamism and part."""
+    rooms: dict[str, list[Recipe]] = {}
+    for recipe in plan.jobs():
+        part = part_of(plan.split, recipe.seed - plan.recipe.seed)
+        words = [recipe.name.rpartition("-s")[0], *([part] if part else []), "v0"]
+        rooms.setdefault(re.sub(r"[^-\w]", "_", "-".join(words)), []).append(recipe)
+    return rooms
+
+
+def _offline(plan: Plan, out: Path, ways: dict[str, Any]) -> Table:
+    """The missing datasets of Minari, and a table of all."""
+    from sim.gym.offline import write
+
+    table = plain_table("Datasets of Minari", caption=f"MINARI_DATASETS_PATH={escape(str(out))}")
+    for heading in ("dataset", "episodes", "steps", "of these"):
+        table.add_column(heading, overflow="fold")
+    with writing(out, plan) as dataset, progress() as bar:
+        task = bar.add_task("driving", total=len(plan.jobs()), unit="")
+        for name, recipes in rooms_of(plan).items():
+            folder = dataset.path / name
+            if not folder.exists():
+                part = part_folder(folder)
+                write(part, name, recipes[0], _drives(recipes, ways, partial(bar.advance, task)))
+                put(part, folder)
+            told = json.loads((folder / "data" / "metadata.json").read_text(encoding="utf-8"))
+            keys = ("total_episodes", "total_steps", "description")
+            table.add_row(name, *(str(told[key]) for key in keys))
+        write_sums(dataset.path)
+    return table
+
+
+def _drives(
+    recipes: list[Recipe], ways: dict[str, Any], advance: Callable[[], None]
+) -> Iterator[Any]:
+    """In the order of their seeds."""
+    for k in range(0, len(recipes), AT_ONCE):
+        drives = []
+        for drive, spent in workers.each(_drive, recipes[k : k + AT_ONCE], **ways):
+            interrupt.check()
+            learn([spent])
+            advance()
+            drives.append(drive)
+        yield from sorted(drives, key=lambda drive: int(drive.seed))
+
+
+def _drive(recipe: Recipe) -> tuple[Any, tuple[Work, float]]:
+    """An episode to learn from, here or in a worker; what it was, and s that it took."""
+    from sim.gym.offline import driven
+
+    started = time.perf_counter()
+    drive = driven(recipe)
+    work = Work(f"{MINARI} {recipe.scene}", recipe.seconds)
+    return drive, (work, time.perf_counter() - started)

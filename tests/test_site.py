@@ -11,6 +11,7 @@ from pathlib import Path
 import pytest
 import typer
 import yaml
+from typer.testing import CliRunner
 
 from scripts.cli import app
 from scripts.site.check import faults, main
@@ -121,9 +122,27 @@ def test_the_code_of_the_jobs_is_that_of_pages_whose_code_is_run():
 
 @pytest.mark.parametrize("block", range(3))
 def test_the_policy_blocks_run(block: int, capsys: pytest.CaptureFixture[str]):
-    code = blocks("jobs/my_policy.md", "python")[block].replace("range(200)", "range(5)")
-    exec(code, {})
-    assert capsys.readouterr().out.strip()
+    exec(blocks("jobs/my_policy.md", "python")[block].replace("range(100)", "range(10)"), {})
+    printed = capsys.readouterr().out.strip()
+    assert printed
+    assert block or f"It prints `{printed}`" in (DOCS / "jobs/my_policy.md").read_text()
+
+
+def test_the_dataset_blocks_run(
+    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
+):
+    """On shorter episodes, where the extra ``data`` is."""
+    pytest.importorskip("minari")
+    monkeypatch.chdir(tmp_path)
+    monkeypatch.setenv("MINARI_DATASETS_PATH", "")  # which the page sets
+    text = "".join(blocks("jobs/my_dataset.md", "sh")).replace("train:8,test:2", "train:1,test:1")
+    lines = [line for line in text.splitlines() if "--format" in line]
+    for line, code in zip(lines, blocks("jobs/my_dataset.md", "python"), strict=True):
+        short = re.sub(r"--seconds \d+", "--seconds 1", line)
+        done = CliRunner().invoke(app, shlex.split(short)[1:], catch_exceptions=False)
+        assert done.exit_code == 0, done.output
+        exec(code, {})
+        assert ", 361)" in capsys.readouterr().out
 
 
 def test_columns_of_a_docstring_become_a_list():

@@ -39,7 +39,7 @@ from slam.system import SlamSystem, create
 PAIRS = 15
 LOW, HIGH = 3, 11  # of the sorted ratios: the median lies between these, 96 %, whatever their law
 PEERS = ("kiss-icp", "small-gicp", "karto")
-COPIES = 2
+MOST_COPIES = 8
 LOOP = 50_000_000
 EPISODE = Recipe(scene="office", seed=SEED, dynamism=DYNAMISM, seconds=2.0)
 Row = dict[str, Any]
@@ -65,16 +65,9 @@ def in_turn(
     return [a for a, _ in pairs], [b for _, b in pairs]
 
 
-def rows(seconds: float) -> Iterator[Row]:
-    """Scan, SLAM and processes; a peer that is not installed is left out."""
-    yield from scans(max(10, round(2 * seconds)))
-    yield from others(max(10, round(2 * seconds)))
-    yield from slams(seconds)
-    yield from at_once(seconds)
-
-
-def scans(count: int) -> Iterator[Row]:
+def scans(seconds: float) -> Iterator[Row]:
     """A scan, with the time, label and truth of each beam, against MuJoCo's bare rays."""
+    count = max(10, round(2 * seconds))
     crowded: dict[str, Any] = {"n_chairs": 200}
     for name, options in (("office", {}), ("office, 200 chairs", crowded)):
         world, laser = at_rest("office", **options)
@@ -89,8 +82,9 @@ def at_rest(scene: str, **options: Any) -> tuple[World, LaserScanner]:
     return world, LaserScanner(world.model, Lms221Config.ideal(), np.random.default_rng(0))
 
 
-def others(count: int) -> Iterator[Row]:
+def others(seconds: float) -> Iterator[Row]:
     """A scan of the arena against one by ir-sim among the same boxes, and movers as discs."""
+    count = max(10, round(2 * seconds))
     try:
         irsim = importlib.import_module("irsim")
     except ImportError:
@@ -162,35 +156,62 @@ def updating(system: SlamSystem, frames: Iterator[Frame], count: int) -> Callabl
     return many(count, lambda: system.update(next(frames)))
 
 
-def at_once(seconds: float) -> Iterator[Row]:
-    """What two get done more than one, by the wall: episodes and rooms, and a plain loop beside."""
-    how = f"times what one does, by {COPIES}; what else runs on the machine counts"
-    loops, steps = ThreadPoolExecutor(COPIES), max(10, round(4 * seconds))
-    sides = {
-        n: MobiliaVectorEnv(8, n_workers=n if n > 1 else 0, scene="arena", time_limit_s=1e6)
-        for n in (1, COPIES)
-    }
-    for rooms in sides.values():
-        rooms.reset(seed=SEED)
+def rooms(seconds: float) -> Iterator[Row]:
+    """Steps of a vector environment: what its workers get done more than one process.
 
-    def stepped(workers: int) -> float:
-        return wall(many(workers * steps, sides[workers].step, np.zeros((8, 2), np.float32)))
+    The plain loop runs in the very same processes: some systems share out the processor by session.
+    """
+    steps, still = max(10, round(4 * seconds)), np.zeros((MOST_COPIES, 2), np.float32)
+    for copies in several():
+        sides = {
+            n: MobiliaVectorEnv(
+                MOST_COPIES, n_workers=n - (n == 1), scene="arena", time_limit_s=1e6
+            )
+            for n in (1, copies)
+        }
+        for side in sides.values():
+            side.reset(seed=SEED)
 
-    def looped(copies: int) -> float:
-        return wall(lambda: list(loops.map(loop, [LOOP] * copies)))
+        def stepped(n: int, sides: dict[int, MobiliaVectorEnv] = sides) -> float:
+            return wall(many(n * steps, sides[n].step, still))
 
-    with tempfile.TemporaryDirectory() as scratch:
+        def looped(n: int, sides: dict[int, MobiliaVectorEnv] = sides) -> float:
+            firsts = [k * MOST_COPIES // n for k in range(n)]
+            return wall(lambda: sides[n].each(one_loop, firsts))
+
+        yield gain(f"{MOST_COPIES} rooms, {copies} workers", copies, stepped, looped)
+        for side in sides.values():
+            side.close()
+
+
+def episodes(_: float) -> Iterator[Row]:
+    """Episodes that are made: what so many processes get done more than one."""
+    with tempfile.TemporaryDirectory() as scratch, ThreadPoolExecutor(MOST_COPIES) as loops:
 
         def made(copies: int) -> float:
             out = Path(tempfile.mkdtemp(dir=scratch))
             jobs = [replace(EPISODE, seed=SEED + k) for k in range(copies)]
             return wall(lambda: list(workers.each(partial(record, parent=out), jobs, jobs=copies)))
 
-        for what, work in (("two workers, 8 rooms", stepped), ("two processes, episodes", made)):
-            found = in_turn(work, looped, lambda each: COPIES * each(1) / each(COPIES))
-            yield compared(f"{what}: a plain loop", found, 1.0, "×", how)
-    for rooms in sides.values():
-        rooms.close()
+        def looped(n: int) -> float:
+            return wall(lambda: list(loops.map(one_loop, range(n))))
+
+        for copies in several():
+            yield gain(f"episodes, {copies} processes", copies, made, looped)
+
+
+def several() -> list[int]:
+    """Two copies, and one a core where there are more."""
+    return sorted({2, min(os.cpu_count() or 2, MOST_COPIES)} - {1})
+
+
+def gain(
+    what: str, copies: int, work: Callable[[int], float], looped: Callable[[int], float]
+) -> Row:
+    """What so many get done more than one, by the wall, beside as many copies of a plain loop."""
+    how = f"times what one does, by {copies}; what else runs on the machine counts"
+    found = in_turn(work, looped, lambda each: copies * each(1) / each(copies))
+    return compared(f"{what}: {copies} copies of a plain loop", found, 1.0, "×", how)
 
 
 def wall(work: Callable[[], object]) -> float:
@@ -198,6 +219,11 @@ def wall(work: Callable[[], object]) -> float:
     start = time.perf_counter()
     work()
     return time.perf_counter() - start
+
+
+def one_loop(_: object) -> float:
+    """The plain loop, for who calls it with something."""
+    return float(loop(LOOP))
 
 
 @njit
@@ -213,7 +239,7 @@ def _digits(figure: float) -> str:
     return f"{figure:.0f}" if figure >= 100.0 else f"{figure:.2g}"
 
 
-def table(found: list[Row], machine: dict[str, Any]) -> str:
+def table(found: list[Row], machine: dict[str, Any], only: str) -> str:
     """As a table of Markdown, with the machine and how busy it is."""
     rows = [
         [row["what"], row["unit"], _digits(row["ours"]), _digits(row["peer"]),
@@ -222,5 +248,6 @@ def table(found: list[Row], machine: dict[str, Any]) -> str:
     ]  # fmt: skip
     heads = ("against", "unit", "mobilia", "peer", "peer / mobilia (96 %)")
     where = f"{machine['processor']} with {machine['cores']} cores at load {os.getloadavg()[0]:.0f}"
-    made = f"Made by `mobilia bench --against --page` on an {where}."
+    said = f"--only {only} " if only else ""
+    made = f"Made by `mobilia bench --against {said}--page` on an {where}."
     return f"{marks.table(heads, rows, left=2)}\n\n{made}"

@@ -4,7 +4,6 @@
 Figures are medians of ``REPEATS`` repeats of processor time.
 """
 
-import os
 import time
 from collections.abc import Callable, Iterator
 from dataclasses import fields, replace
@@ -182,30 +181,16 @@ def short_episodes(n: int, workers: int, steps: int) -> Iterator[Row]:
         if any(turns := np.arange(n) * scans // n == k):
             rooms.reset(options={"reset_mask": turns})
         rooms.step(still)
-    spent, started = np.zeros(steps), workers_s(rooms)
+    spent = np.zeros(steps)
     for k in range(steps):
         begun = time.perf_counter()
         rooms.step(still)
         spent[k] = time.perf_counter() - begun
-    used = workers_s(rooms) - started
     rooms.close()
     what = f"env steps, {n} rooms, 2 s episodes, {workers or 'no'} workers"
     how = "office, every effect; by the wall, so that what else runs counts"
-    yield row(what, n * steps / spent.sum(), "1/s", "", how)
-    yield row(f"{what}: a processor second", n * steps / used, "1/s", "", "office, all processes")
     yield row(f"{what}: mean step", spent.mean() * 1e3, "ms", "", how)
     yield row(f"{what}: worst step", spent.max() * 1e3, "ms", "", how)
-
-
-def workers_s(rooms: MobiliaVectorEnv) -> float:
-    """Processor time of this process and of those that step the rooms, s."""
-    there: dict[int, float] = dict(rooms.each(process_s))
-    return sum({**there, os.getpid(): time.process_time()}.values())
-
-
-def process_s(_: object) -> tuple[int, float]:
-    """Which process this is, and its processor time, s."""
-    return os.getpid(), time.process_time()
 
 
 def stepping(room: Any, steps: int, n: int) -> float:

@@ -27,6 +27,7 @@ EXTRAS = {  # what each is for; how to get them follows from their names
     "guests": "SLAMs of others to compare with",
     "yag": "YAG SLAM",
     "rl": "training policies (sim.gym.learning)",
+    "data": "Parquet and Minari (export, generate)",
     "ros2": "nodes of ROS 2 over DDS and Zenoh",
     "cluster": "--cluster",
 }

@@ -9,9 +9,11 @@ from typing import Any
 from rich.table import Table
 
 from scripts.console import console, working
-from scripts.spec import option, spec
+from scripts.spec import names_of, option, spec
 from slam.errors import InvalidValueError
 from slam.files import write_text
+
+MEASURES = ("scans", "others", "slams", "rooms", "episodes")  # of ``scripts.benches.against``
 
 
 @spec
@@ -31,19 +33,42 @@ class Bench:
         "Also write the figures to this JSON file.", None, "--json", writes=True
     )
     against: bool = option("Only ratios to others that are installed, in turn.", False)
+    only: str | None = option(
+        f"With --against, one of {', '.join(MEASURES)}: these rows alone. rooms: what the workers "
+        "of a vector environment gain, beside as many copies of a plain loop.",
+        choices=MEASURES,
+        complete=names_of("scripts.verbs.bench:MEASURES"),
+    )
     page: Path | None = option(
-        "With --against: fill the place `speed` of this page of Markdown.", writes=True
+        "With --against: fill the place `speed`, or the one called as --only, of this page of "
+        "Markdown.",
+        writes=True,
     )
 
     def __call__(self) -> None:
-        if self.page is not None and not self.against:
-            raise InvalidValueError("--page needs --against: its table is of ratios to others")
+        if (self.page or self.only) is not None and not self.against:
+            raise InvalidValueError("--page and --only need --against: they are of its table")
         from scripts.machine import machine, versions
 
-        rows = _against(self.seconds, self.page) if self.against else _measured(self.seconds)
+        rows = self._against() if self.against else _measured(self.seconds)
         if self.out is not None:
             report = {"schema": 1, "machine": machine(), "versions": versions(), "rows": rows}
             write_text(self.out, json.dumps(report, indent=2) + "\n")
+
+    def _against(self) -> list[dict[str, Any]]:
+        """Ratios to others, also on the console and in their place on a page."""
+        from scripts import marks
+        from scripts.benches import against
+        from scripts.machine import machine
+
+        wanted = (self.only,) if self.only else MEASURES
+        with working("measuring ours and others in turn"):
+            rows = [row for name in wanted for row in getattr(against, name)(self.seconds)]
+        told = against.table(rows, machine(), self.only or "")
+        console.print(told, markup=False, soft_wrap=True)
+        if self.page is not None:
+            marks.fill_page(self.page, self.only or "speed", told)
+        return rows
 
 
 def _measured(seconds: float) -> list[dict[str, Any]]:
@@ -68,19 +93,4 @@ def _measured(seconds: float) -> list[dict[str, Any]]:
         shown = f"{figure:.0f}" if figure >= 100.0 else f"{figure:.3g}"
         table.add_row(row["what"], shown, row["unit"], row["target"], row["how"])
     console.print(table)
-    return rows
-
-
-def _against(seconds: float, page: Path | None) -> list[dict[str, Any]]:
-    """Ratios to others, also on the console and in their place on a page."""
-    from scripts import marks
-    from scripts.benches import against
-    from scripts.machine import machine
-
-    with working("measuring ours and others in turn"):
-        rows = list(against.rows(seconds))
-    told = against.table(rows, machine())
-    console.print(told, markup=False, soft_wrap=True)
-    if page is not None:
-        marks.fill_page(page, "speed", told)
     return rows

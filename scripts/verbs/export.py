@@ -6,25 +6,30 @@ from pathlib import Path
 from rich.markup import escape
 
 from scripts.console import say, working
-from scripts.names import check
-from scripts.spec import REQUIRED, SLAMS, argument, option, spec
+from scripts.formats import FORMATS, ready
+from scripts.names import check, run_name
+from scripts.spec import REQUIRED, SLAMS, argument, names_of, option, spec
 from slam.errors import InvalidValueError
 
 SLAM = "shunting"
-SUFFIXES = {"tum": ".tum", "carmen": ".log.gz", "npz": ".npz", "smfeval": ".tum"}
 
 
 @spec
 class Export:
-    """Write an episode as TUM trajectories, as a CARMEN log or as NumPy arrays.
+    """Write an episode, a bag or any other log in the format of others.
 
-    tum: NAME_odometry.tum and, where it is known, NAME_truth.tum. carmen: scans, odometry, true
-    poses. npz: everything, labels too, as arrays by name. smfeval: runs a SLAM; NAME_SLAM.tum has
-    its online poses with their covariances ("wide TUM"), NAME_truth.tum the true ones in its map.
+    mcap, db3: the very messages of a bag of ROS 2, packed as MCAP or as SQLite. parquet (extra
+    `data`): a row a scan, ranges and labels as lists of fixed size. npz: the same as arrays by
+    name. carmen: scans, odometry, true poses. tum: NAME_odometry.tum and, where it is known,
+    NAME_truth.tum. smfeval: runs a SLAM; NAME_SLAM.tum has its online poses with their covariances
+    ("wide TUM"), NAME_truth.tum the true ones in its map. minari is of `generate --format`.
     """
 
     episode: Path = argument("An episode, a bag or any other log.", REQUIRED)
-    to: str = option("tum, carmen, npz or smfeval.", REQUIRED, choices=tuple(SUFFIXES))
+    to: str = option(
+        f"{', '.join(FORMATS)}.", REQUIRED, choices=tuple(FORMATS), metavar="FORMAT",
+        complete=names_of("scripts.formats:FORMATS"),
+    )  # fmt: skip
     out: Path | None = option(
         "File to write; default beside the log or dataset. tum: NAME_odometry.tum, ...",
         writes=True,
@@ -37,18 +42,16 @@ class Export:
         check([self.slam])
         if self.out is not None and self.out.is_dir():
             raise InvalidValueError(f"--out must be a file, got the folder {self.out}")
-        from scripts import exports
+        suffix = ready(self.to).suffix
+        from scripts.exports import Source, write
         from sim.recording.verify import check_bag
-        from slam.logs import open_log, read_bag
-        from slam.logs.bag_topics import is_bag
 
         check_bag(self.episode)
-        bag = is_bag(self.episode)
-        stream = read_bag(self.episode, labels=True) if bag else open_log(self.episode)
         plain = self.episode.absolute()
-        target = self.out or _beside(plain) / (plain.name.split(".log")[0] + SUFFIXES[self.to])
+        name = plain.name if plain.is_dir() else run_name(plain)
+        target = self.out or _beside(plain) / (name + suffix)
         with working(f"writing {self.to}"):
-            written = exports.WRITERS[self.to](target, stream, self.slam)
+            written = write(self.to, target, Source(self.episode, self.slam))
         for path in written:
             say(escape(str(path)))
 

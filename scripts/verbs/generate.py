@@ -8,8 +8,9 @@ from typing import TYPE_CHECKING
 from scenes import registry
 from scripts import options
 from scripts.console import console
+from scripts.formats import BAG, FORMATS, MINARI, ready
 from scripts.names import check
-from scripts.spec import REQUIRED, SCENES, argument, option, part, spec
+from scripts.spec import REQUIRED, SCENES, argument, names_of, option, part, spec
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -40,7 +41,6 @@ class Generate:
         "seeds: 0 0.5 1 or start:stop:step.",
         fills=("Plan.dynamisms",),
     )
-    dynamism_sweep: str = option("The same.", "", hidden=True)
     moves: options.Moves = part(options.Moves, without=("dynamism",))
     episodes: int | None = option("Episodes (in each scene, at each dynamism); default 1.")
     split: str = option(
@@ -48,6 +48,14 @@ class Generate:
         "train:8,validation:1,test:1. Each gets a list of its episodes, OUT/train.txt.",
         "",
         metavar="NAME:N,...",
+    )
+    format: str = option(
+        "Also write each episode so, beside its bag: db3, parquet, npz, carmen, tum or smfeval (as "
+        "export does). minari: no bags, but episodes with actions and rewards, driven to goals.",
+        BAG,
+        choices=tuple(FORMATS),
+        metavar="FORMAT",
+        complete=names_of("scripts.formats:FORMATS"),
     )
     seconds: float = option("Length of an episode, s.", 60.0)
     seed: int = option("Seed of the first episode; each next one adds 1.", 0)
@@ -61,10 +69,10 @@ class Generate:
 
     def plan(self) -> "Plan":
         """The episodes of the dataset; ``InvalidValueError`` for what cannot be."""
-        sweep = [self.dynamism_sweep] if self.dynamism_sweep else None
-        levels = options.levels(sweep or self.dynamism or ["0.5"], "--dynamism")
+        levels = options.levels(self.dynamism or ["0.5"], "--dynamism")
         rooms = options.named(self.scene)
         check([], *rooms)
+        ready(self.format, recorded=False)
         from scripts import workers
         from sim.recording.dataset import Plan
         from sim.recording.recipe import Recipe
@@ -86,7 +94,10 @@ class Generate:
         plan = Plan(
             recipe=first, dynamisms=levels, twins=self.twins, sessions=self.sessions, split=parts,
             episodes=sum(dict(parts).values()) or usual, scenes=rooms if len(rooms) > 1 else (),
+            format="" if self.format == BAG else self.format,
         )  # fmt: skip
+        if self.format == MINARI:
+            _check_environment(plan)
         workers.check_jobs(self.work.jobs)
         for name in rooms:  # a wrong name is told, and a module found, before anything starts
             registry.find(name)
@@ -95,11 +106,15 @@ class Generate:
     def __call__(self) -> None:
         plan, out = self.plan(), self.out
         from scripts import pace
-        from scripts.dataset import carry_out
+        from scripts.dataset import carry_out, rooms_of
 
         there = set(os.listdir(out)) if out.is_dir() else set()
         missing = [job for job in plan.jobs() if not there.issuperset(plan.folders(job))]
-        works = [pace.Work(f"generate {job.scene}", job.seconds) for job in missing]
+        kind = "generate"
+        if self.format == MINARI:
+            kind, rooms = MINARI, rooms_of(plan)
+            missing = [job for name in rooms.keys() - there for job in rooms[name]]
+        works = [pace.Work(f"{kind} {job.scene}", job.seconds) for job in missing]
         pace.announce(
             f"{len(missing)} of {len(plan.jobs())} drives to record", works, self.work.jobs
         )
@@ -107,8 +122,19 @@ class Generate:
             return
         table = carry_out(plan, out, jobs=self.work.jobs, cluster=self.work.cluster)
         console.print(table)
+        if self.format == MINARI:
+            return
         table.title = None  # what was made now is not of the dataset
         _page(plan, out, table)
+
+
+def _check_environment(plan: "Plan") -> None:
+    """``InvalidValueError`` for what an environment cannot have."""
+    from sim.gym.offline import spec_of
+
+    if plan.twins or plan.sessions:
+        raise InvalidValueError("--format minari is of single drives: no --twins and no --sessions")
+    spec_of(plan.recipe)
 
 
 def _page(plan: "Plan", out: Path, table: "Table") -> None:

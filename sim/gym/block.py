@@ -53,8 +53,6 @@ class Block:
     """Some rooms of ``board``, by their number.
 
     mode     what becomes of those whose episode is over
-    frames   whether ``reset`` and ``step`` return the frame of each room, by its number, and that
-             of the end of an episode where the room has begun anew since
     threads  where rooms of next episodes are built ahead of time; None: not at all
     """
 
@@ -63,29 +61,21 @@ class Block:
         rooms: Mapping[int, MobiliaEnv],
         board: Board,
         mode: AutoresetMode,
-        *,
-        frames: bool,
         threads: Executor | None = None,
     ) -> None:
         self.board = board
-        self._rooms, self._mode, self._frames, self._threads = rooms, mode, frames, threads
-        self._last: dict[int, Any] = {}  # frames
+        self._rooms, self._mode, self._threads = rooms, mode, threads
 
-    def reset(
-        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None
-    ) -> dict[int, tuple[Any, Any]]:
+    def reset(self, seeds: Mapping[int, int | None], options: dict[str, Any] | None) -> None:
         """Reset those of its rooms that have a seed, be that None."""
-        mine = [i for i in self._rooms if i in seeds]
-        for i in mine:
-            self._restart(i, seeds[i], options)
-        return self._both(mine)
+        for i in self._rooms:
+            if i in seeds:
+                self._restart(i, seeds[i], options)
 
-    def step(self) -> dict[int, tuple[Any, Any]]:
+    def step(self) -> None:
         """One step of each room; one whose episode is over begins anew."""
-        self._last = {}
         for i in self._rooms:
             self._step(i)
-        return self._both(list(self._rooms))
 
     def _step(self, i: int) -> None:
         row = self.board[i]
@@ -98,7 +88,6 @@ class Block:
         self._keep(i, observation)
         if self._mode == AutoresetMode.SAME_STEP and any(ends):
             row["last"] = row["now"]
-            self._last |= self._shown([i])
             self._restart(i, None, None)
             row["ends"] = ends
 
@@ -124,12 +113,6 @@ class Block:
             now["seen"][name] = value
         for name, value in self._rooms[i].told().items():
             now["told"][name] = math.nan if value is None else value
-
-    def _shown(self, rooms: Sequence[int]) -> dict[int, Any]:
-        return {i: self._rooms[i].simulation.frame for i in rooms} if self._frames else {}
-
-    def _both(self, rooms: Sequence[int]) -> dict[int, tuple[Any, Any]]:
-        return {i: (frame, self._last.get(i)) for i, frame in self._shown(rooms).items()}
 
     def each(self, work: Callable[[MobiliaEnv], Any], rooms: Sequence[int]) -> dict[int, Any]:
         """What ``work`` of each of these rooms returns, by their number."""

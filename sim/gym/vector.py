@@ -24,7 +24,7 @@ from sim.gym.observation import Observation
 from sim.gym.options import array_of, checked_seed, of_rooms
 from sim.gym.workers import RoomsEndedError, Workers
 from slam.errors import InvalidValueError
-from slam.shaped import one_of, shaped, whole
+from slam.shaped import one_of, whole
 
 MOST_ENVS = 4096  # each holds a physics model of its own
 MOST_WORKERS = 1024
@@ -44,20 +44,20 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     episode ignores that room's action and returns its reset observation with reward 0; drop that
     transition when learning. "same_step": the ending step already returns the observation of the
     new episode, the last one of the old is in ``infos["final_obs"][i]``. "disabled": stepping a
-    room that has ended is an error. A room that resets by itself goes on with its own generator,
-    and without options.
+    room that has ended is an error, ``reset`` with a ``reset_mask`` comes first. A room that resets
+    by itself goes on with its own generator, and without options.
 
     ### Infos
     ``pose`` (n, 3), ``goal`` (n, 2) and ``goal_distance`` (n,) NaN without a goal,
-    ``hard_collision`` (n,), ``is_success`` (n,), and with ``frames`` also ``frame`` (n,) objects;
-    all with a mask of the same name and a leading "_", here always true. They are of the new
-    episode where "same_step" began one; ``infos["final_info"]`` has those of the old one.
+    ``hard_collision`` (n,), ``is_success`` (n,), all with a mask of the same name and a leading
+    "_", here always true. They are of the new episode where "same_step" began one;
+    ``infos["final_info"]`` has those of the old one. Whatever else a room knows, ``each`` asks for:
+    ``rooms.each(attrgetter("simulation.frame"))``.
 
     ### Workers
     ``n_workers`` processes have the rooms in blocks; 0, the default: this one has them all. Arrays
     are shared, a step sends some bytes. Where a room begins anew by itself, its worker builds the
-    room of the next episode meanwhile, so that a reset hardly holds the others up. With ``frames``
-    the frames of each step are sent.
+    room of the next episode meanwhile, so that a reset hardly holds the others up.
 
     ``settings`` are those of ``MobiliaEnv``, ``pose_source`` by name only, so that each room has a
     SLAM of its own; rendering is left to the single environment.
@@ -69,14 +69,10 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         *,
         autoreset_mode: str | AutoresetMode = AutoresetMode.NEXT_STEP,
         n_workers: int = 0,
-        frames: bool = False,
         **settings: Any,
     ) -> None:
         whole("num_envs", num_envs, 1, MOST_ENVS)
         whole("n_workers", n_workers, 0, MOST_WORKERS)
-        shaped("frames", frames, bool)
-        if "n_threads" in settings:
-            raise InvalidValueError("n_threads is gone: n_workers=2 steps the rooms in 2 processes")
         source = settings.get("pose_source")
         if num_envs > 1 and source is not None and not isinstance(source, str):
             raise InvalidValueError(
@@ -85,7 +81,6 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             )
         self.num_envs = num_envs
         self.mode = _mode(autoreset_mode)
-        self._frames = frames
         self.metadata = {**MobiliaEnv.metadata, "autoreset_mode": self.mode}
         rooms = [MobiliaEnv(**settings) for _ in range(1 if n_workers else num_envs)]
         space = rooms[0].observation_space
@@ -94,15 +89,14 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         self.observation_space = batch_space(space, num_envs)
         self.action_space = batch_space(self.single_action_space, num_envs)
         self._begun: NDArray[np.bool_] = np.zeros(num_envs, dtype=np.bool_)
-        self._shown: NDArray[np.object_] = np.empty((2, num_envs), dtype=object)  # frames, last
         self._rooms: Block | Workers
         if n_workers:
             workers = min(n_workers, num_envs)
-            self._rooms = Workers(workers, space, num_envs, self.mode, settings, frames=frames)
+            self._rooms = Workers(workers, space, num_envs, self.mode, settings)
             weakref.finalize(self, self._rooms.close)  # where nobody closes it
         else:
             board = board_of(row_of(space), num_envs)
-            self._rooms = Block(dict(enumerate(rooms)), board, self.mode, frames=frames)
+            self._rooms = Block(dict(enumerate(rooms)), board, self.mode)
         self._board = self._rooms.board
         self._now, self._last = self._board["now"], self._board["last"]
 
@@ -140,17 +134,13 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             )
         seeds = self._seeds(seed)
         chosen = {i: seeds[i] for i in np.flatnonzero(mask).tolist()}
-        self._show(self._rooms.reset(chosen, own))
+        self._rooms.reset(chosen, own)
         self._begun |= mask
         return _copied(self._now["seen"]), self._infos()
 
     def _refuse_closed(self) -> None:
         if self.closed:
             raise RoomsEndedError("the environment is closed")
-
-    def _show(self, frames: Mapping[int, tuple[Any, Any]]) -> None:
-        for i, both in frames.items():
-            self._shown[:, i] = both
 
     def _seeds(self, seed: Any) -> list[int | None]:
         """One for each room."""
@@ -176,10 +166,13 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         self._refuse_closed()
         if not self._begun.all():
             raise ResetNeededError("call reset() before using the environment")
-        if self.mode == AutoresetMode.DISABLED and board["ends"].any():
-            raise ResetNeededError(f"reset first: {np.flatnonzero(board['ends'].any(axis=1))}")
+        if self.mode == AutoresetMode.DISABLED and (ended := board["ends"].any(axis=1)).any():
+            raise ResetNeededError(
+                f"rooms {np.flatnonzero(ended).tolist()} have ended: reset(options={{'reset_mask': "
+                "terminated | truncated}), or make them with autoreset_mode='next_step'"
+            )
         board["command"] = commands
-        self._show(self._rooms.step())
+        self._rooms.step()
         terminated, truncated = board["ends"].T.copy()
         infos = self._infos()
         if self.mode == AutoresetMode.SAME_STEP and board["ends"].any():
@@ -194,16 +187,12 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             seen[i] = {name: np.array(last["seen"][name]) for name in last["seen"].dtype.names}
             for name in last["told"].dtype.names:
                 infos[name][i] = last["told"][name]
-            if self._frames:
-                infos["frame"][i] = self._shown[1, i]
         return {
             "final_obs": seen, "_final_obs": ended, "final_info": infos, "_final_info": ended,
         }  # fmt: skip
 
     def _infos(self) -> dict[str, Any]:
         told = _copied(self._now["told"])
-        if self._frames:
-            told["frame"] = self._shown[0].copy()
         return told | {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in told}
 
     def render(self) -> None:

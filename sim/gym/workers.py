@@ -51,7 +51,7 @@ class Workers:
     """``n_workers`` processes, each with a block of the ``n`` rooms of ``board``.
 
     space     of the observations of one room
-    mode, settings, frames  as for ``Block``
+    mode, settings  as for ``Block``
 
     Raises ``InvalidValueError`` for settings that cannot be sent to another process, and whatever
     ``MobiliaEnv`` says of them there.
@@ -64,8 +64,6 @@ class Workers:
         n: int,
         mode: AutoresetMode,
         settings: Mapping[str, Any],
-        *,
-        frames: bool,
     ) -> None:
         self._asked, self._ended = 0, ""
         self._workers: list[tuple[subprocess.Popen[bytes], Connection]] = []
@@ -77,7 +75,7 @@ class Workers:
                 self.board: Board = board_of(row, n, mmap.mmap(file.fileno(), size))
                 for k in range(n_workers):
                     self._start(file.fileno(), k, n_workers)
-            self._all("begin", loaded(), _packed(row, n, mode, dict(settings), frames))
+            self._all("begin", loaded(), _packed(row, n, mode, dict(settings)))
         except BaseException:
             self.close()
             raise
@@ -96,15 +94,13 @@ class Workers:
         with suppress(OSError):  # it has ended: the first answer says so
             ours.send(sys.path)
 
-    def reset(
-        self, seeds: Mapping[int, int | None], options: dict[str, Any] | None
-    ) -> dict[int, tuple[Any, Any]]:
+    def reset(self, seeds: Mapping[int, int | None], options: dict[str, Any] | None) -> None:
         """As of a ``Block``, and so are ``step`` and ``each``."""
-        return self._all("reset", seeds, options)
+        self._all("reset", seeds, options)
 
-    def step(self) -> dict[int, tuple[Any, Any]]:
+    def step(self) -> None:
         """One step of each room; one whose episode is over begins anew."""
-        return self._all("step")
+        self._all("step")
 
     def each(self, work: Callable[[MobiliaEnv], Any], rooms: Sequence[int]) -> dict[int, Any]:
         """What ``work`` of each of these rooms returns; both are sent."""
@@ -229,11 +225,11 @@ def _block(
     memory: int, k: int, n_workers: int, threads: Executor, modules: Sequence[str], told: bytes
 ) -> Block:
     load(modules)  # before what is told, which may be of them
-    row, n, mode, settings, frames = _unpacked(told)
+    row, n, mode, settings = _unpacked(told)
     board = board_of(row, n, mmap.mmap(memory, n * row.itemsize))
     mine = range(k * n // n_workers, (k + 1) * n // n_workers)
     rooms = {i: MobiliaEnv(**settings) for i in mine}
-    return Block(rooms, board, mode, frames=frames, threads=threads)
+    return Block(rooms, board, mode, threads)
 
 
 def _failed(number: int, error: Exception) -> bytes:

@@ -102,18 +102,33 @@ def _entry(space: Any, name: str, who: str) -> spaces.Box:
 
 
 def goal_rooms(
-    id_: str, num_envs: int = 8, *, n_sectors: int = SECTORS, **settings: Any
+    id_: str,
+    num_envs: int = 8,
+    *,
+    n_sectors: int = SECTORS,
+    autoreset_mode: str = "disabled",
+    n_workers: int = 2,
+    scans: str = "last",
+    **settings: Any,
 ) -> VectorEnv[Any, Any, Any]:
     """Rooms that a small network learns in fast, each seen as ``GoalVector(LidarMinPooling)``.
 
-    settings  of ``sim.gym.vector.MobiliaVectorEnv``. Unless they say otherwise, a step takes one
-              scan (``scans="last"``), two processes step the rooms, and whoever steps them resets
-              those that have ended (``autoreset_mode="disabled"``).
+    autoreset_mode  who begins the next episode of a room whose last one has ended: "disabled", you,
+                    with ``reset(options={"reset_mask": terminated | truncated})`` before the next
+                    step; "next_step" and "same_step", the room itself
+    n_workers       processes that step the rooms
+    scans           "last": a step takes one scan; "all": each of its scans
+    settings        others of ``sim.gym.vector.MobiliaVectorEnv``
+
+    Every reset puts the robot at the scene's start mark, at rest. With an id ``...Goal`` a goal is
+    drawn on floor that it can reach, and furniture and people by the episode's seed. An episode is
+    terminated at the goal, and with ``terminate_on_collision`` by a hard contact; it is truncated
+    after ``time_limit_s``.
     """
-    usual = {"autoreset_mode": "disabled", "n_workers": 2, "scans": "last"}
     rooms: Any = gymnasium.make_vec(
-        id_, num_envs=num_envs, vectorization_mode="vector_entry_point", **{**usual, **settings}
-    )
+        id_, num_envs=num_envs, vectorization_mode="vector_entry_point", n_workers=n_workers,
+        autoreset_mode=autoreset_mode, scans=scans, **settings,
+    )  # fmt: skip
     many: VectorEnv[Any, Any, Any] = GoalVector(LidarMinPooling(rooms, n_sectors))
     return many
 

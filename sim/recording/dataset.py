@@ -12,7 +12,7 @@ from pathlib import Path
 from sim.core.versions import check_world
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.splits import Split, checked_split, file_of, list_text, part_of
-from sim.recording.sums import SUMS, Fault, foreign, read_sums, sha256, text_of
+from sim.recording.sums import SUMS, Fault, faults, foreign, read_sums, sha256, text_of
 from sim.recording.tables import FILES, write_days
 from sim.recording.verify import Finding, check_hashes, finding, listed_in, other_format
 from sim.twins.twins import TWINS
@@ -20,11 +20,12 @@ from sim.world.times_of_day import MOST_SESSIONS
 from slam import bounded, locks
 from slam.errors import InvalidValueError, LogFormatError, OutputError
 from slam.files import PART, is_part, make_folder, reason, write_text
-from slam.shaped import whole
+from slam.shaped import instance, whole
 
 PLAN = "dataset.json"
 PAGE = "index.html"  # for who looks at it; listed where ``generate`` came as far as that
 SCHEMA = 1
+MINARI = "minari"  # ``Plan.format`` of a dataset without bags
 MAX_EPISODES = 1_000_000
 MAX_BYTES = 1 << 20  # of dataset.json
 
@@ -42,6 +43,8 @@ class Plan:
     scenes      (), or several, that of the recipe first
     split       (), or parts by name and number of seeds, which add up to ``episodes``
                 (``sim.recording.splits``)
+    format      "", or what each episode is also written as (``scripts.formats``); ``MINARI``: no
+                bags, but the drives of ``sim.gym.offline``
     """
 
     recipe: Recipe
@@ -51,9 +54,11 @@ class Plan:
     sessions: int = 0
     scenes: tuple[str, ...] = ()
     split: Split = ()
+    format: str = ""
 
     def __post_init__(self) -> None:
         whole("Plan.episodes", self.episodes, 1, MAX_EPISODES)
+        instance("Plan.format", self.format, str)
         self._check_parts()
         if not self.dynamisms or len(set(self.dynamisms)) != len(self.dynamisms):
             raise InvalidValueError(
@@ -128,7 +133,7 @@ class Plan:
     def text(self) -> str:
         """``dataset.json``."""
         told = asdict(self) | {"recipe": self.recipe.words()}
-        for name in ("sessions", "scenes", "split"):  # added since the first plans
+        for name in ("sessions", "scenes", "split", "format"):  # added since the first plans
             if not told[name]:
                 del told[name]
         return json.dumps({"schema": SCHEMA, **told}, indent=1, sort_keys=True) + "\n"
@@ -237,6 +242,8 @@ def check_dataset(path: Path) -> list[Finding]:
     files: tuple[str, ...] = (PLAN,)
     try:
         plan = read_plan(path)
+        if plan.format == MINARI:
+            return [finding(path.resolve().name, [*found, *faults(path, listed, results=False)])]
         planned: Mapping[str, Recipe | None] = plan.planned()
         files = plan.files
     except LogFormatError as error:

@@ -69,25 +69,30 @@ class _Summary:
 
 
 def record(
-    recipe: Recipe, parent: Path, *, note: Callable[[], None] = lambda: None
+    recipe: Recipe,
+    parent: Path,
+    *,
+    note: Callable[[], None] = lambda: None,
+    beside: Callable[[Path], object] = lambda episode: None,
 ) -> dict[str, Result]:
     """Make the episode's folder in ``parent``, or the folders of all three twins.
 
     A recipe whose ``twin`` is "dynamic" makes the other two as well: one drive makes all three.
-    ``note`` is called after each frame. Folders appear when they are whole; one that is there
-    already is left as it is. Returns the results by folder name. Raises ``OutputError`` naming the
-    folder that cannot be written.
+    ``note`` is called after each frame, ``beside`` with each folder once all that follows from the
+    recipe is in it: it may write more files, which are listed like the others. Folders appear when
+    they are whole; one that is there already is left as it is. Returns the results by folder name.
+    Raises ``OutputError`` naming the folder that cannot be written.
     """
     if not recipe.twin:
         simulation = Simulation(**recipe.simulation())
         moments = toured(simulation, recipe.seconds)
-        return {recipe.name: _write(recipe, parent, simulation, moments, note)}
+        return {recipe.name: _write(recipe, parent, simulation, moments, note, beside)}
     twins = Twins(**recipe.simulation(), seconds=recipe.seconds)
     results = {}
     for name in TWINS:
         own = recipe.of_twin(name)
         moments = twins.moments(name)
-        results[own.name] = _write(own, parent, twins.simulation, moments, note)
+        results[own.name] = _write(own, parent, twins.simulation, moments, note, beside)
     return results
 
 
@@ -97,6 +102,7 @@ def _write(
     simulation: Simulation,
     moments: Iterator[Moment],
     note: Callable[[], None],
+    beside: Callable[[Path], object],
 ) -> Result:
     scene, summary = simulation.world.scene, _Summary()
     rearranged: list[Rearrangement] = []
@@ -122,6 +128,7 @@ def _write(
         if topics.names():
             result["topics"] = topics.names()
         write_recipe(folder / RECIPE, recipe, result)
+        beside(folder)
         write_sums(folder)
         size = sum(file.stat().st_size for file in folder.iterdir())
     return {**result, "bytes": size}

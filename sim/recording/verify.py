@@ -175,7 +175,8 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
     with _scratch() as scratch:
         record(recipe, Path(scratch))
         again = Path(scratch) / made.recipe.name
-        same = read_sums(again) == read_sums(folder)
+        there = read_sums(folder)  # also of what was made of the bag, in other formats
+        same = all(there.get(name) == digest for name, digest in read_sums(again).items())
         result = read_recipe(again / RECIPE).result
     if same:
         return Finding(episode=folder.name, verdict="same bytes")

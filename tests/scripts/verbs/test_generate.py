@@ -18,23 +18,18 @@ import pytest
 import typer
 
 from scripts.spec import command
-from scripts.verbs.export import Export
 from scripts.verbs.generate import Generate
 from scripts.verbs.verify import Verify
 from sim.recording.dataset import Plan, check_dataset, read_plan, writing
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, write_sums
 from sim.recording.verify import regenerate
-from slam import create
 from slam.errors import InvalidValueError, LogFormatError, OutputError
-from slam.evaluation.wide_tum import to_body
-from slam.logs import read_bag, read_carmen
-from slam.ros.template import EPOCH_NS
-from slam.trajectory import read_tum
+from slam.logs import read_bag
 from tests.processes import python
 
 pytestmark = pytest.mark.slow
-export, generate, verify = command(Export), command(Generate), command(Verify)
+generate, verify = command(Generate), command(Verify)
 
 REPO = Path(__file__).resolve().parents[3]
 SETTINGS = {"episodes": 3, "seconds": 1.5, "seed": 1}
@@ -248,54 +243,20 @@ def test_one_command_makes_parts_of_several_scenes(tmp_path):
     assert not all(finding.ok for finding in check_dataset(out))
 
 
-def test_exports_are_read_back(serial, tmp_path):
-    episode, frames = serial / NAMES[0], list(read_bag(serial / NAMES[0], labels=True))
-    export(episode, "tum", tmp_path / "a.tum")
-    truth, poses = read_tum(tmp_path / "a_truth.tum"), read_tum(episode / "trajectory.tum").poses
-    assert truth.stamps_ns.tolist() == [f.stamp_ns + EPOCH_NS for f in frames]
-    np.testing.assert_array_equal(truth.poses, poses)
-    np.testing.assert_allclose(poses, [f.truth for f in frames], atol=1e-9)
-    assert not (tmp_path / "a.tum").exists()  # of what, its name would not say
-    odometry = read_tum(tmp_path / "a_odometry.tum").poses
-    np.testing.assert_allclose(odometry, [f.odometry.T_odom_robot for f in frames], atol=1e-9)
-    export(episode, "carmen", tmp_path / "a.log.gz")
-    back = list(read_carmen(tmp_path / "a.log.gz"))
-    for ours, theirs in zip(frames, back, strict=True):
-        assert ours.stamp_ns == theirs.stamp_ns
-        assert np.array_equal(ours.scan.ranges, theirs.scan.ranges, equal_nan=True)
-        assert np.array_equal(ours.odometry.T_odom_robot, theirs.odometry.T_odom_robot)
-        assert np.array_equal(ours.truth, theirs.truth)
-    export(episode, "npz", tmp_path / "a.npz")
-    with np.load(tmp_path / "a.npz") as arrays:
-        assert np.array_equal(arrays["ranges"][3], frames[3].scan.ranges, equal_nan=True)
-        assert np.array_equal(arrays["label_kind"][3], frames[3].labels.kind)
-        assert np.array_equal(arrays["T_world_robot"][-1], frames[-1].truth)
-    before = sorted(serial.rglob("*"))
-    export(episode, "carmen", None)
-    assert sorted(serial.rglob("*")) == before  # a file that nothing lists would be foreign there
-    (serial.parent / f"{episode.name}.log.gz").unlink()
-    with pytest.raises(LogFormatError, match=f"name one of the recordings in it: {NAMES[0]}"):
-        export(serial, "tum", None)
-
-
-def test_poses_with_covariances_are_exported(serial, tmp_path):
-    episode, frames = serial / NAMES[0], list(read_bag(serial / NAMES[0]))
-    export(episode, "smfeval", tmp_path / "a.tum")
-    rows = np.loadtxt(tmp_path / "a_shunting.tum")
-    stamps_s = [(frame.stamp_ns + EPOCH_NS) / 1e9 for frame in frames]
-    np.testing.assert_allclose(rows[:, 0], stamps_s, rtol=0, atol=1e-6)
-    slam = create("shunting")
-    said = [slam.update(frame.without_truth()) for frame in frames]
-    yaws = 2.0 * np.arctan2(rows[:, 6], rows[:, 7])
-    online = np.column_stack([rows[:, 1:3], yaws])
-    np.testing.assert_allclose(online, [e.T_map_robot for e in said], atol=1e-12)
-    lower = [to_body(e.covariance, e.T_map_robot[2])[np.tril_indices(6)] for e in said]
-    np.testing.assert_allclose(rows[:, 8:], lower, atol=1e-9)
-    truth = read_tum(tmp_path / "a_truth.tum").poses
-    np.testing.assert_allclose(truth[0], 0.0, atol=1e-9)  # in the map, as the poses are
-    assert np.hypot(*(truth - online)[:, :2].T).max() < 0.05
-    with pytest.raises(InvalidValueError, match="states none"):
-        export(episode, "smfeval", tmp_path / "b.tum", "karto")
+def test_each_episode_is_also_in_another_format(serial, tmp_path):
+    out = tmp_path / "data"
+    words = {"episodes": 1, "seconds": 0.2, "format": "npz"}
+    generate(["arena"], out, **words)
+    (episode,) = whole_episodes(out)
+    with np.load(episode / f"{episode.name}.npz") as arrays:
+        ranges = [frame.scan.ranges for frame in read_bag(episode)]
+        np.testing.assert_array_equal(arrays["ranges"], ranges)
+    assert all(finding.ok for finding in check_dataset(out))
+    assert regenerate(episode).verdict == "same bytes"
+    with pytest.raises(OutputError, match="another dataset"):
+        generate(["arena"], out, **{**words, "format": "mcap"})
+    flip(episode / f"{episode.name}.npz")
+    assert not all(finding.ok for finding in check_dataset(out))
 
 
 def kill_in_mid_episode(worker: subprocess.Popen[bytes], out: Path) -> None:

@@ -34,13 +34,13 @@ sys.stdin.read()
 
 @pytest.fixture
 def rooms():
-    many = MobiliaVectorEnv(3, n_workers=2, autoreset_mode="same_step", frames=True, **SHORT)
+    many = MobiliaVectorEnv(3, n_workers=2, autoreset_mode="same_step", **SHORT)
     yield many
     many.close()
 
 
 def test_errors_and_objects_come_from_workers_as_from_here(rooms):
-    here = MobiliaVectorEnv(3, autoreset_mode="same_step", frames=True, **SHORT)
+    here = MobiliaVectorEnv(3, autoreset_mode="same_step", **SHORT)
     for options, words in ({"gaol": 1}, "unknown key 'gaol'"), ({"goal": (99, 0)}, "goal"):
         for many in (rooms, here):
             with pytest.raises(InvalidValueError, match=words):
@@ -52,11 +52,9 @@ def test_errors_and_objects_come_from_workers_as_from_here(rooms):
     for step in range(6):
         told = [m.step(np.full((3, 2), 0.2)) if step else m.reset(seed=4) for m in (rooms, here)]
         infos = [each[-1] for each in told]
-        scans = [[frame.scan.ranges for frame in each["frame"]] for each in infos]
-        np.testing.assert_array_equal(*scans)
+        frames = [m.each(attrgetter("simulation.frame")) for m in (rooms, here)]
+        assert frames[0] == frames[1]
         assert ("final_info" in infos[0]) == ("final_info" in infos[1]) == (step == 5)
-    last = [[frame.stamp_ns for frame in each["final_info"]["frame"]] for each in infos]
-    assert last[0] == last[1] != [frame.stamp_ns for frame in infos[0]["frame"]]
     times = attrgetter("simulation.world.time_ns")
     assert rooms.each(times) == here.each(times)
     assert rooms.each(methodcaller("__getattribute__", "time_limit_s"), [2]) == [0.15]
@@ -76,8 +74,6 @@ def test_rooms_that_are_closed_say_so_with_workers_and_without():
         for asked in (lambda many=many: many.reset(seed=1), lambda many=many: many.step(STILL)):
             with pytest.raises(RoomsEndedError, match="closed"):
                 asked()
-    with pytest.raises(InvalidValueError, match="n_workers"):
-        MobiliaVectorEnv(2, n_threads=2, scene="arena")
 
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
