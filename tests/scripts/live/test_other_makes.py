@@ -27,7 +27,7 @@ def test_their_stamped_twists_move_the_robot(client):
             for shown in session.run():
                 network.send(shown)
                 time.sleep(1.0 / 37.5)
-                for request in network.requests():
+                for request in network.requests(print):
                     session.hands.do(request)
                 if drives.poll() is not None:
                     break
