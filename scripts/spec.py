@@ -90,8 +90,9 @@ class Option:
             wanted, value = f"be one of {', '.join(self.choices)}", f"{value!r:.80}"
         if self.span and not self.span[0] <= value <= self.span[1]:
             low, high = self.span
-            wanted = f"lie in {f'{low}..{high}' if self.kind is int else f'[{low:g}, {high:g}]'}"
-            wanted, value = f"{wanted} {self.unit}".rstrip(), f"{value:g}"
+            ends = f"{low}..{high}" if self.kind is int else f"[{low:g}, {high:g}]"
+            wanted = f"lie in {ends} {self.unit}".rstrip()
+            value = value if self.kind is int else f"{value:g}"
         if self.suffix and value.suffix.lower() != self.suffix:
             wanted, value = f"be a file that ends in {self.suffix}", f"'{value}'"
         if wanted:

@@ -30,9 +30,6 @@ MODES = ("trinary", "scale", "raw")
 Fields = dict[str, str | list[str | None] | None]
 _YES, _NO = ("1", "true", "yes", "on"), ("0", "false", "no", "off")
 
-_UNKNOWN_RGB = (176, 180, 184)
-_STOPS = np.array([0.0, 0.5, 1.0])  # of existence: free paper, doubtful amber, solid ink
-_STOPS_RGB = np.array([[252, 250, 245], [233, 160, 76], [22, 33, 58]], dtype=np.float64)
 MAX_PIXELS = 1 << 28  # 490 m square at 3 cm cells
 MAX_CELL_M, MIN_CELL_M = 1e3, 1e-4  # edge of a cell
 MAX_ORIGIN = 1e8  # m, rad; beyond, a float has no room for cells
@@ -172,17 +169,6 @@ def _meaning(yaml: Path, fields: Fields, mode: str) -> Float32:
     between = (occupancy - low) / (high - low) if scale else np.nan
     meant = np.where(occupancy > high, 1.0, np.where(occupancy < low, 0.0, between))
     return meant.astype(np.float32)
-
-
-def raster_image(raster: Raster) -> Bytes:
-    """(height, width, 3) RGB picture, highest y on top: free light, solid dark, unknown gray."""
-    values = raster.values[::-1].astype(np.float64)
-    unknown = np.isnan(values)
-    values[unknown] = 0.0
-    channels = [np.interp(values, _STOPS, _STOPS_RGB[:, k]) for k in range(3)]
-    image = np.round(np.stack(channels, axis=-1)).astype(np.uint8)
-    image[unknown] = _UNKNOWN_RGB
-    return image
 
 
 def _check_cells(count: int, shape: tuple[int, ...]) -> None:

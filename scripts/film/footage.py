@@ -83,11 +83,10 @@ class Footage:
                     "A simulated scene has them (--scene), and a bag of 'mobilia generate'."
                 )
         return Show(
-            moments=Moments(replay),
+            moments=Moments(replay, truth_name=self.truth_name),
             stage=self.stage,
             title=self.title,
             duration_s=self.duration_s,
-            truth_name=self.truth_name,
             pace=pace or Pace.within_a_minute(self.duration_s),
             size=size,
         )

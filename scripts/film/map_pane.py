@@ -29,7 +29,7 @@ _STOPS = {
     0.0: draw.PAPER, 0.08: (244, 226, 196), 0.35: (226, 150, 60), 0.7: (120, 52, 62),
     1.0: (24, 22, 34),
 }  # fmt: skip
-_COLORS = np.stack(
+COLORS = np.stack(
     [
         np.interp(np.linspace(0.0, 1.0, 256), [*_STOPS], one)
         for one in zip(*_STOPS.values(), strict=True)
@@ -57,7 +57,7 @@ def raster_picture(raster: Raster, view: View, T_view_map: Float) -> Picture:
     warped = cv2.warpAffine(
         levels, affine, (view.width, view.height), flags=cv2.INTER_LINEAR, borderValue=0
     )
-    picture: Picture = cv2.applyColorMap(warped, _COLORS).astype(np.uint8, copy=False)
+    picture: Picture = cv2.applyColorMap(warped, COLORS).astype(np.uint8, copy=False)
     return picture
 
 
@@ -193,21 +193,6 @@ class CloseUp:
             return
         draw.polyline(picture, ends, color, max(1, round(2 * self._unit)))
         draw.dots(picture, ends[:1], [color], 4 * self._unit)
-
-
-def off_by(error: Float, covariance: Float) -> str:
-    """How far off, and how many of its own sigmas that is: ``1.7 cm off, 1.2 σ``.
-
-    error (2,) m and covariance (2, 2) m^2 in one frame.
-    """
-    a, b, c = float(covariance[0, 0]), float(covariance[0, 1]), float(covariance[1, 1])
-    determinant = a * c - b * b
-    word = f"{draw.measured(math.hypot(error[0], error[1]))} off"
-    if determinant <= 0.0:
-        return word
-    x, y = float(error[0]), float(error[1])
-    squared = (c * x * x - 2.0 * b * x * y + a * y * y) / determinant
-    return f"{word}, {math.sqrt(max(squared, 0.0)):.1f} σ"
 
 
 def _grown(radius: float, reach: float) -> float:

@@ -16,13 +16,13 @@ import numpy as np
 from scripts.film import panes
 from scripts.film.chart import UNSURE, ErrorChart, Series
 from scripts.film.encode import SIZE, Pace, Size
-from scripts.film.map_pane import CloseUp, MapPane, off_by
+from scripts.film.map_pane import CloseUp, MapPane
 from scripts.film.panes import Box, Layout
 from scripts.film.stage import Stage
 from sim.events import Event
 from sim.view import draw
-from sim.view.draw import Color, Picture
-from sim.view.moment import SIGMAS, Moments, Shown
+from sim.view.draw import Picture
+from sim.view.moment import DOUBTS, SIGMAS, Moments, Shown, short, verdict_of
 from sim.view.scans import LEGEND
 from slam import se2
 from slam.estimate import Raster
@@ -56,7 +56,6 @@ class Show:
     stage: Stage
     title: str
     duration_s: float
-    truth_name: str = "truth"
     pace: Pace = field(default_factory=Pace)
     size: Size = SIZE
     seen: SeenSpace = field(default_factory=SeenSpace)
@@ -86,18 +85,6 @@ class Show:
         """What the filmed system has estimated so far."""
         return self.moments.track
 
-    def named(self) -> list[tuple[str, Color]]:
-        """Whose colour is which: the tracks, then the truth where there is one."""
-        names = {name: name for name in self.replay.tracks}
-        if self.shown is not None and self.shown.truth_map is not None and self.truth_name:
-            names["truth"] = self.truth_name
-        return [(_short(word), self.moments.colors[name]) for name, word in names.items()]
-
-    def legend(self) -> list[tuple[str, Color]]:
-        """The same for a strip, with what the colours of the beams say."""
-        beams = LEGEND if self.stage.labelled else ()
-        return self.named() + [(f"scan: {word}", color) for word, color in beams]
-
     @property
     def last_points_map(self) -> Float:
         """(k, 2) m, what the last scan saw where the primary track believes it was."""
@@ -116,7 +103,7 @@ class Show:
                 self._scans.append((shown.number, frame.scan))
         for name in self.replay.tracks:
             self.series.setdefault(name, Series()).add(shown, name)
-        if not here.converged:
+        if verdict_of(here) in DOUBTS:
             start_s = end_s = shown.seconds
             if self.unsure and end_s - self.unsure[-1].end_s < SAME_DOUBT_S:
                 start_s = self.unsure.pop().start_s
@@ -240,8 +227,8 @@ class _Panes:
         _put(canvas, box, self._close.paint(se2.compose(T, own), truth, turned))
         if shown.truth_map is not None:
             at = (box.x, box.y + box.height + round(6 * unit))
-            words = off_by((own - shown.truth_map)[:2], covariance[:2, :2])
-            draw.text(canvas, words, at, round(13 * unit), bold=True)
+            words, color = shown.told()[1]
+            draw.text(canvas, words, at, round(13 * unit), color, bold=True)
 
     def _headline(self, canvas: Picture, seconds: float) -> None:
         show, unit = self._show, self._layout.unit
@@ -258,12 +245,12 @@ class _Panes:
         unit, (width, height) = layout.unit, layout.size
         canvas: Picture = np.full((height, width, 3), draw.PAPER, np.uint8)
         size = round(17 * unit)
-        words = f"{show.title} · {_short(show.primary)}"
+        words = f"{show.title} · {short(show.primary)}"
         x = draw.text(canvas, words, (round(16 * unit), round(12 * unit)), size, bold=True)
         self._time_x = x + round(24 * unit)
         self._key(canvas)
         titles = [
-            (layout.map, f"map of {_short(show.primary)}: {self._holds()}scan, trails"),
+            (layout.map, f"map of {short(show.primary)}: {self._holds()}scan, trails"),
             (layout.close, f"close-up, {SIGMAS:g} σ ellipse"),
         ]
         titles += list(zip(layout.more, self._more, strict=True))
@@ -296,17 +283,12 @@ class _Panes:
         """Which colour is whose, from the right."""
         show, unit = self._show, self._layout.unit
         size, x = round(13 * unit), self._layout.size[0] - round(16 * unit)
-        for word, color in reversed(show.named()):
+        for word, color in reversed(show.moments.named()):
             x -= draw.text_width(word, size, bold=True)
             draw.text(canvas, word, (x, round(14 * unit)), size, color, bold=True)
             bar, y = round(18 * unit), round(21 * unit)
             canvas[y : y + round(3 * unit), x - bar - round(6 * unit) : x - round(6 * unit)] = color
             x -= bar + round(24 * unit)
-
-
-def _short(word: str) -> str:
-    """Of a long command, its two ends."""
-    return word if len(word) <= 28 else f"{word[:10]}…{word[-12:]}"
 
 
 def _put(canvas: Picture, box: Box, picture: Picture) -> None:

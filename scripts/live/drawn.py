@@ -4,14 +4,17 @@
 Room and scan lie in the world; map, estimates and paths in the map, which lies where the run began.
 """
 
+import html
+import itertools
 import math
 from collections.abc import Callable, Sequence
-from dataclasses import replace
 from functools import partial
 from typing import Any
 
 import numpy as np
+from numpy.typing import NDArray
 
+from scripts.film.map_pane import COLORS, FOLLOW_M
 from sim.view import draw
 from sim.view.draw import Color
 from sim.view.moment import Moments, Path, Shown, ellipse
@@ -20,7 +23,6 @@ from sim.world.world import World
 from slam import se2
 from slam.estimate import Landmarks, Raster
 from slam.frames import Float
-from slam.maps import raster_image
 
 LIFT_M = 0.03  # of the map and of lines above the floor, that they are seen
 ROBOT_M = 0.45  # height at which the arrow of an estimate floats: above a robot
@@ -30,8 +32,12 @@ PATH_POINTS = 400  # of a path as drawn
 PATH_S = 1.0  # so often of the run it is drawn anew
 LEVELS = 8  # of a cell of it that are told apart
 STEPS_M, STEPS_TURN = 512.0, 1024.0  # parts of a metre and of a turn that are told apart
-LOG_BOUNDS = (-10.0, -10.0, 10.0, 10.0)  # of what is seen of a log at first, m
+FOV = 0.7  # rad, of a page's camera, up and down
+OUT = 0.4  # m to the side that it stands off for each m up
+HIGH_M = 1.0  # of what is surely in view
+SPARE = 0.93  # of a picture: what the room takes up
 AROUND = 9  # corners of a circle as drawn
+GAMMA = 2.2  # of a screen
 _NO_SHADOW = {"cast_shadow": False, "receive_shadow": False}
 _ARROW = np.array([[0.32, 0.0, 0.0], [-0.22, 0.2, 0.0], [-0.1, 0.0, 0.0], [-0.22, -0.2, 0.0]])
 
@@ -39,7 +45,7 @@ _ARROW = np.array([[0.32, 0.0, 0.0], [-0.22, 0.2, 0.0], [-0.1, 0.0, 0.0], [-0.22
 class Drawn:
     """Draws moments into a ``viser.SceneApi``; used by one thread.
 
-    parts   what is seen of the room, None for a log;   bounds  xmin, ymin, xmax, ymax of it, m
+    parts   what is seen of the room, None for a log
     map_s   so often at most the map is drawn anew, s of the run
     """
 
@@ -49,7 +55,7 @@ class Drawn:
         self._scene, self.moments = scene, moments
         self.parts = None if world is None else Parts(world.scene, world.model)
         self._height_m = 0.0 if world is None else world.scene.scan_height_m
-        self.bounds = LOG_BOUNDS if world is None else world.scene.bounds
+        self._room_bounds = None if world is None else world.scene.bounds
         self._nodes: dict[str, Any] = {}
         self._values: dict[str, Any] = {}
         self._placed: Placed | None = None
@@ -60,6 +66,15 @@ class Drawn:
         scene.configure_environment_map(None)
         scene.add_light_hemisphere("/light/sky", ground_color=(150, 150, 150), intensity=2.4)
         scene.add_light_directional("/light/sun", intensity=1.5, position=(-3.0, -6.0, 9.0))
+
+    @property
+    def bounds(self) -> tuple[float, float, float, float]:
+        """xmin, ymin, xmax, ymax of the room, m; of a log, of what lies about the path so far."""
+        if self._room_bounds is not None:
+            return self._room_bounds
+        points = np.vstack([np.zeros(2), self.moments.paths[self.moments.primary].points()])
+        (xmin, ymin), (xmax, ymax) = points.min(axis=0) - FOLLOW_M, points.max(axis=0) + FOLLOW_M
+        return float(xmin), float(ymin), float(xmax), float(ymax)
 
     def draw(self, shown: Shown) -> None:
         """Make the scene show it."""
@@ -99,7 +114,7 @@ class Drawn:
             name, (vertices, faces) = f"room/{k}_{batch.shape}", mesh(batch.shape, AROUND)
             add = partial(
                 self._scene.add_batched_meshes_simple, f"/{name}", vertices, faces,
-                batched_scales=batch.sizes.astype(np.float32), batched_colors=batch.colors,
+                batched_scales=batch.sizes.astype(np.float32), batched_colors=_linear(batch.colors),
                 batched_opacities=batch.opacity if batch.glass else None,
                 flat_shading=batch.shape == BOX, lod="off", **_NO_SHADOW,
             )  # fmt: skip
@@ -122,15 +137,13 @@ class Drawn:
         self._put("scan", add, points=points, colors=rgb, position=position)
 
     def _cells(self, raster: Raster | None) -> None:
-        """The map in the colours of the pictures; unknown cells are transparent."""
+        """The map in the colours of films; where nothing is, one sees the floor."""
         if raster is None:
             return
-        levels = np.round(raster.values * LEVELS) / LEVELS  # a picture of few colours is small
-        raster = replace(raster, values=levels.astype(np.float32))
-        cells = np.empty((*raster.values.shape, 4), np.uint8)
-        cells[..., :3] = raster_image(raster)
-        known = np.nan_to_num(raster.values[::-1], nan=-1.0)
-        cells[..., 3] = np.where(known < 0.0, 0.0, 60.0 + 195.0 * np.minimum(known * 2.0, 1.0))
+        known = np.round(np.nan_to_num(raster.values[::-1]) * LEVELS) / LEVELS  # few: a small file
+        cells = np.empty((*known.shape, 4), np.uint8)
+        cells[..., :3] = COLORS[np.round(255.0 * known).astype(np.uint8), 0]
+        cells[..., 3] = 255.0 * np.minimum(known * 2.0, 1.0)
         high, wide = (float(n * raster.resolution_m) for n in raster.values.shape)
         middle = se2.compose(raster.T_map_origin, np.array([0.5 * wide, 0.5 * high, 0.0]))
         (w, _, _, z), position = _pose(middle, LIFT_M)
@@ -175,7 +188,7 @@ class Drawn:
 
     def _lines(self, name: str, segments: Float, color: Color, wide_m: float) -> None:
         segments = np.round(segments, 3).astype(np.float32)
-        colors = np.broadcast_to(np.array(color, np.uint8), segments.shape)
+        colors = np.broadcast_to(_linear(np.array(color)), segments.shape)
         if len(segments) or name in self._nodes:
             node = f"/map/{'/'.join(map(_node, name.split('/')))}"
             add = partial(self._scene.add_line_segments, node, thickness=wide_m)
@@ -211,20 +224,52 @@ def _segments(xy: Float, *, closed: bool = False) -> Float:
     return pieces if closed else pieces[:-1]
 
 
+def _linear(rgb: NDArray[Any]) -> NDArray[np.uint8]:
+    """Colours of batches and of lines as viser takes them: in linear light."""
+    return np.rint(255.0 * (rgb / 255.0) ** GAMMA).astype(np.uint8)
+
+
 def _node(name: str) -> str:
     """A track's name as part of a name in the scene."""
     return "".join(c if c.isalnum() or c in "-_." else "_" for c in name)
 
 
-def look_at(camera: Any, bounds: Sequence[float], *, upright: bool = False) -> None:
-    """Where a page's camera is at first: south of the room and above it; on an ``upright`` screen
-    its longer side goes up."""
+def look_at(camera: Any, bounds: Sequence[float], aspect: float) -> None:
+    """Let a camera look at a room from the south and from above, from so near that the room fills a
+    picture of that width by height; from the west where its longer side fits better so."""
     xmin, ymin, xmax, ymax = bounds
-    middle, wide, high = (0.5 * (xmin + xmax), 0.5 * (ymin + ymax), 0.0), xmax - xmin, ymax - ymin
-    far = max(0.7 * wide, high)
-    away = (0.0, -0.75 * far, 0.85 * far)
-    if upright:
-        far = max(1.3 * min(wide, high), 0.75 * max(wide, high))
-        away = (-0.45 * far, 0.0, far) if wide > high else (0.0, -0.45 * far, far)
-    camera.position = tuple(m + a for m, a in zip(middle, away, strict=True))
-    camera.look_at = middle
+    turned = (xmax - xmin > ymax - ymin) != (aspect > 1.0)
+    ahead = np.array([OUT, 0.0, -1.0] if turned else [0.0, OUT, -1.0]) / math.hypot(OUT, 1.0)
+    right = np.array([0.0, -1.0, 0.0] if turned else [1.0, 0.0, 0.0])
+    corners = np.array([*itertools.product((xmin, xmax), (ymin, ymax), (0.0, HIGH_M))])
+    back_m, position, reach = 0.0, np.zeros(3), SPARE * math.tan(0.5 * FOV)
+    for way, slope in ((right, reach * aspect), (np.cross(right, ahead), reach)):
+        # how far the planes through the camera that bound its sight lie out, on either side
+        far, near = (float((corners @ (s * way - slope * ahead)).max()) for s in (1.0, -1.0))
+        back_m = max(back_m, 0.5 * (far + near) / slope)
+        position += 0.5 * (far - near) * way
+    position -= back_m * ahead
+    camera.fov, camera.position = FOV, tuple(position.tolist())
+    camera.look_at = tuple((position - position[2] / ahead[2] * ahead).tolist())
+
+
+def told(shown: Shown) -> str:
+    """What a moment's SLAM says of itself and how far off it is, in colour, as HTML."""
+    words = (
+        f"<b style='color:{'inherit' if color == draw.INK else f'rgb{color}'}'>"
+        f"{html.escape(text)}</b>"
+        for text, color in shown.told()
+    )
+    return f"{html.escape(shown.primary)}: {'<br>'.join(words)}"
+
+
+def legend(moments: Moments) -> str:
+    """Which colour is whose, as HTML; beams without a return are not drawn."""
+    looks = {word: f"rgb{color}" for word, color in moments.legend() if color != draw.GRAY}
+    stops = ",".join(f"rgb{tuple(color)}" for color in COLORS[[30, 90, 180, 255], 0].tolist())
+    looks["map, the darker the surer"] = f"linear-gradient(90deg,{stops})"
+    rows = (
+        f"<span><i style='background:{look}'></i>{html.escape(word)}</span>"
+        for word, look in looks.items()
+    )
+    return f"<div class=key>{' '.join(rows)}</div>"

@@ -6,7 +6,6 @@ over; they touch neither the world nor the playback.
 """
 
 import html
-import importlib
 import math
 import time
 from collections import deque
@@ -15,6 +14,7 @@ from typing import Any
 
 import numpy as np
 
+from scripts.live.drawn import legend, told
 from scripts.live.messages import Controls
 from scripts.live.playback import (
     KEPT_S,
@@ -31,13 +31,15 @@ from scripts.live.playback import (
     Tour,
 )
 from scripts.live.session import Session
-from sim.view.moment import Shown
+from sim.view import draw
+from sim.view.moment import Shown, verdict_of
 from sim.world.requests import Kidnap, MoveDoor, Push
 from slam.errors import MobiliaError
 from slam.system import names as slams
 
 STATUS_S, PLOT_S = 0.2, 0.5  # of the wall: so often the words and the plot are told anew
-MOST_SAID = 4  # lines of events
+MOST_SAID = 4  # lines of events, and of what was asked for
+MARKS_M, MOST_M = (1e-3, 1e-2, 1e-1, 1.0, 10.0), 30.0  # of the plot's axis, a logarithmic one
 ANSWER_S = 4.0  # of the wall: so long the title says what was done
 BACK_S = 5.0  # that a key looks back
 HOLD_HZ = 4.0  # twists a second while a key of the pad is held
@@ -63,15 +65,18 @@ class Page:
         self, gui: Any, scene: Any, controls: Controls, inbox: Inbox, settings: dict[str, Any]
     ) -> None:
         self._gui, self._controls, self._inbox = gui, controls, inbox
-        self._said: deque[str] = deque(maxlen=MOST_SAID)
-        self._series: deque[tuple[float, ...]] = deque(maxlen=1200)
+        self._own: deque[str] = deque(maxlen=MOST_SAID)
+        self._happened: deque[str] = deque(maxlen=MOST_SAID)
+        self._series: deque[tuple[float, ...]] = deque(maxlen=2400)
         self._shown_s = self._plot_s = -math.inf
-        self._wall = time.monotonic
-        self._answer, self._answer_until, self._labelled = "", 0.0, ""
-        self._back_s = 0.0  # of the moment that is shown
+        self._number = -1  # of the last moment that was noted
+        self._answer, self._answer_until = "", 0.0
+        self._at_s = self._back_s = 0.0  # of the moment that is shown
         self._status = gui.add_html("starting: inner loops are compiled the first time")
+        self._answers = gui.add_html("")
         self._plot = self._plotted()
         self._events = gui.add_html("")
+        self._legend = gui.add_html("")
         if settings["room"]:
             self._driving(scene)
         self._time()
@@ -81,76 +86,65 @@ class Page:
 
     def show(self, shown: Shown, playback: Playback, session: Session) -> None:
         """What the words and the plot say of a moment."""
-        now, name = self._wall(), shown.primary
-        (off, _), (claimed, _) = shown.error(name), shown.claimed(name)
+        now, name, self._at_s = time.monotonic(), shown.primary, shown.seconds
         self._back_s = playback.present.seconds - shown.seconds if playback.present else 0.0
-        if not playback.looks_back:
-            self._series.append((shown.seconds, off, claimed))
-        for said in shown.said if not playback.looks_back else ():
-            self._said.appendleft(said)
-            self._events.content = _lines(self._said)
+        if shown.number > self._number:
+            self._number = shown.number
+            both_m = shown.error(name)[0], shown.claimed(name)[0]
+            self._series.append((shown.seconds, *np.maximum(both_m, MARKS_M[0])))
+            self._happened.extendleft(map(html.escape, shown.said))
         if now - self._shown_s >= STATUS_S or not playback.playing:
             self._shown_s = now
-            self._status.content = self._words(shown, playback, session, off, claimed)
+            self._status.content = _words(self._run(shown, playback, session), told(shown))
+            self._events.content = _words(*self._happened, kind="log")
+            self._legend.content = _words(legend(session.moments))
             self._play.label = "Pause" if playback.playing else "Play"
-            verdict = f"{shown.seconds:.0f} s · {name}: {shown.verdict}"
-            self._label(self._answer if now < self._answer_until else verdict)
+            (claim, _), *off = shown.told()
+            verdict = f"{verdict_of(shown.own)}: {off[0][0]}" if off else claim
+            title = f"{shown.seconds:.0f} s · {verdict}"
+            # all that a phone shows at first
+            self._gui.set_panel_label(self._answer if now < self._answer_until else title)
         if now - self._plot_s >= PLOT_S and len(self._series) > 1:
             self._plot_s = now
-            seconds, offs, claims = np.array(self._series).T
-            kept = seconds > shown.seconds - KEPT_S
-            self._plot.data = (seconds[kept], 100.0 * offs[kept], 100.0 * claims[kept])
+            rows = np.array(self._series)
+            self._plot.data = tuple(rows[rows[:, 0] > shown.seconds - KEPT_S].T.copy())
 
-    def say(self, text: str) -> None:
-        """A line for the log of events, at once; for a while the panel's title says it too."""
-        self._said.appendleft(text)
-        self._events.content = _lines(self._said)
-        self._answer, self._answer_until = text[:60], self._wall() + ANSWER_S
-        self._label(self._answer)
-
-    def _label(self, text: str) -> None:
-        """The title of the panel, which is all of it that a phone shows at first."""
-        if text != self._labelled:
-            self._labelled = text
-            self._gui.set_panel_label(text)
+    def say(self, text: str, *, own: bool = False) -> None:
+        """An event, or what one did oneself; for a while the panel's title says it too."""
+        lines, place = (self._own, self._answers) if own else (self._happened, self._events)
+        lines.appendleft(html.escape(f"{self._at_s:.1f} s: {text[:160]}"))
+        place.content = _words(*lines, kind="log")
+        self._answer, self._answer_until = text[:60], time.monotonic() + ANSWER_S
+        self._gui.set_panel_label(self._answer)
 
     def restart(self) -> None:
         """Another run begins."""
         self._series.clear()
+        self._number = -1
 
-    def _words(
-        self, shown: Shown, playback: Playback, session: Session, off: float, claimed: float
-    ) -> str:
-        hands, name, verdict = session.hands, shown.primary, shown.verdict
-        driver = "log" if hands is None else "you drive" if hands.client_drives else "on tour"
+    def _run(self, shown: Shown, playback: Playback, session: Session) -> str:
+        driver = "log"
+        if session.hands is not None:
+            driver = "you drive" if session.hands.client_drives else "on tour"
         state = "playing" if playback.playing else "paused"
         if playback.looks_back:
             state = "looking back"
         elif playback.ended:
             state = "at its end"
-        known = "" if math.isnan(off) else f"{100.0 * off:.1f} cm off, "
-        color = "#168c5a" if verdict == "tracking" else "#ce2c3c"
-        rows = (
-            f"<b>{shown.seconds:.1f} s</b> · {state} · {playback.speed:g} × · {driver}",
-            f"{html.escape(name)}: <b style='color:{color}'>{html.escape(verdict)}</b>, "
-            f"{known}claims {100.0 * claimed:.1f} cm",
-        )
-        return f"<div style='margin:0 .6em'>{'<br>'.join(rows)}</div>"
+        return f"<b>{shown.seconds:.1f} s</b> · {state} · {playback.speed:g} × · {driver}"
 
     def _plotted(self) -> Any:
-        uplot = importlib.import_module("viser.uplot")
+        """Of the last minute, on a logarithmic axis as in films."""
+        error = {"label": "error", "stroke": f"rgb{draw.RED}", "width": 2}
+        claim = {"label": "2 σ claimed", "stroke": f"rgb{draw.MUTED}", "dash": (4, 3)}
+        words = [*map(draw.length, MARKS_M)]
         return self._gui.add_uplot(
-            data=(np.zeros(2), np.zeros(2), np.zeros(2)),
-            series=(
-                uplot.Series(label="s"),
-                uplot.Series(label="error, cm", stroke="#ce2c3c", width=2),
-                uplot.Series(label="claimed, 2 σ", stroke="#a4a8b0", width=1, dash=(4, 3)),
-            ),
-            scales={"x": uplot.Scale(time=False, auto=True), "y": uplot.Scale(auto=True)},
-            axes=(uplot.Axis(size=28), uplot.Axis(size=36)),
-            legend=uplot.Legend(show=True),
-            height=130,
-        )
+            data=(np.arange(2.0), np.full(2, math.nan), np.full(2, math.nan)),
+            series=({}, error, claim),
+            scales={"x": {"time": False}, "y": {"distr": 3, "range": (MARKS_M[0], MOST_M)}},
+            axes=({"size": 34}, {"size": 58, "splits": MARKS_M, "values": words}),
+            legend={"live": False}, padding=(12, 16, 0, 0), height=150,
+        )  # fmt: skip
 
     # -- what can be asked for ----------------------------------------------------------------
 
@@ -259,6 +253,5 @@ class Page:
             self._on(gui.add_button(words), anew)
 
 
-def _lines(said: deque[str]) -> str:
-    rows = "<br>".join(html.escape(text[:160]) for text in said)
-    return f"<div style='margin:0 .6em;font-size:.85em'>{rows}</div>"
+def _words(*lines: str, kind: str = "") -> str:
+    return f"<div class='words {kind}'>{'<br>'.join(lines)}</div>"

@@ -119,7 +119,7 @@ class Inbox:
                 f"{MOST_WAITING} requests wait already: this one is dropped"
             ) from None
 
-    def refuse(self, why: MobiliaError) -> None:
+    def refuse(self, why: object) -> None:
         """Keep this to be told to the clients, in place of what was kept before."""
         self._refused = str(why)[:300]
 

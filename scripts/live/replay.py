@@ -12,6 +12,7 @@ moment by viser's own recorder; nothing is served.
 import asyncio
 import html
 import importlib
+import json
 import math
 import threading
 from collections.abc import Iterable, Iterator
@@ -23,8 +24,8 @@ from types import SimpleNamespace
 from typing import Any
 
 from scripts.film.show import Show
-from scripts.live.drawn import Drawn, look_at
-from scripts.live.served import require
+from scripts.live.drawn import Drawn, legend, look_at, told
+from scripts.live.served import HEAD, require
 from sim.view.moment import Moments, Shown
 from sim.world.world import World
 from slam.files import replacing
@@ -34,6 +35,8 @@ MOMENT_S = 0.1  # of the replay between two moments
 MOST_MOMENTS = 1200  # of one file; a longer run is shown faster
 FEW_PARTS = 900  # that move; of more, moments come less often, four times at the most
 MOST_MAPS = 40  # that are drawn of one run
+WIDE, TALL = 1.7, 0.5  # pages: width by height
+WORDS = Path(__file__).with_name("replay.html")
 
 
 class Recorder:
@@ -42,18 +45,14 @@ class Recorder:
     def __init__(
         self, moments: Moments, world: World | None, *, title: str, seconds: float
     ) -> None:
-        self._tape, self._scene, camera = _taped()
+        self._tape, self._scene = _taped()
         self.moments, self._map_s = moments, seconds / MOST_MAPS
         self._drawn = Drawn(self._scene, moments, world, self._map_s)
-        look_at(camera, self._drawn.bounds)
         parts = 0 if self._drawn.parts is None else self._drawn.parts.moving
         self._rest_s = MOMENT_S * min(max(1.0, parts / FEW_PARTS), 4.0)
         self._step_s = max(self._rest_s, seconds / MOST_MOMENTS)
-        self._title, self._drawn_s = title, -math.inf
-        xmin, _, _, ymax = self._drawn.bounds
-        self._words = self._scene.add_label(
-            "/words", title, position=(xmin, ymax, 2.6), anchor="bottom-left"
-        )
+        self._title, self._drawn_s, self._tape_s = title, -math.inf, 0.0
+        self._told: list[tuple[float, str]] = []
 
     @classmethod
     @contextmanager
@@ -77,12 +76,13 @@ class Recorder:
         if shown is None or shown.seconds - self._drawn_s < self._step_s - 1e-6:
             return
         if math.isfinite(self._drawn_s):  # a replay of at most two minutes, however long the run
-            faster = self._step_s / self._rest_s
-            self._tape.insert_sleep((shown.seconds - self._drawn_s) / faster)
+            rest_s = (shown.seconds - self._drawn_s) * self._rest_s / self._step_s
+            self._tape.insert_sleep(rest_s)
+            self._tape_s += rest_s
         self._drawn_s = shown.seconds
         raster, landmarks = self.moments.look(self._map_s, self._map_s)
         self._drawn.draw(replace(shown, raster=raster, landmarks=landmarks))
-        self._words.text = self._said(shown)
+        self._told.append((round(self._tape_s, 3), f"{shown.seconds:.1f} s · {told(shown)}"))
 
     def noting(self, frames: Iterable[Frame]) -> Iterator[Frame]:
         """``frames`` for a track to take; each is noted when the next is asked for."""
@@ -94,16 +94,22 @@ class Recorder:
         """The file, whole: call it once."""
         self._tape.insert_sleep(MOMENT_S)
         page: str = self._tape.as_html()
-        return page.replace("<title>Viser</title>", f"<title>{html.escape(self._title)}</title>", 1)
+        head = f"<title>{html.escape(self._title)}</title>{HEAD.read_text()}{self._words()}</head>"
+        return page.replace("<title>Viser</title>", "", 1).replace("</head>", head, 1)
 
-    def _said(self, shown: Shown) -> str:
-        off_m, _ = shown.error(shown.primary)
-        off = "" if math.isnan(off_m) else f", {100.0 * off_m:.1f} cm off"
-        return f"{self._title} · {shown.seconds:.1f} s · {shown.primary}: {shown.verdict}{off}"
+    def _words(self) -> str:
+        """What stands over the scene, and where a wide and a tall page look from."""
+        views = [SimpleNamespace(), SimpleNamespace()]
+        for camera, aspect in zip(views, (WIDE, TALL), strict=True):
+            look_at(camera, self._drawn.bounds, aspect)
+        given = {"views": [vars(camera) for camera in views], "told": self._told,
+                 "title": html.escape(self._title), "key": legend(self.moments)}  # fmt: skip
+        text = json.dumps(given, ensure_ascii=False).replace("</", "<\\/")
+        return WORDS.read_text().replace("GIVEN", text, 1)
 
 
-def _taped() -> tuple[Any, Any, Any]:
-    """viser's recorder, scene and first camera, without the server that they come with."""
+def _taped() -> tuple[Any, Any]:
+    """viser's recorder and scene, without the server that they come with."""
     viser = require()
     infra = importlib.import_module("viser.infra")
     buffer_class = importlib.import_module("viser.infra._async_message_buffer").AsyncMessageBuffer
@@ -121,5 +127,4 @@ def _taped() -> tuple[Any, Any, Any]:
     owner = SimpleNamespace(client_id="", _websock_connection=handler, _viser_server=server)
     scene = viser.SceneApi(owner, ThreadPoolExecutor(1), loop)
     scene.set_up_direction("+z")
-    camera = importlib.import_module("viser._viser").InitialCameraConfig(handler.queue_message)
-    return tape, scene, camera
+    return tape, scene

@@ -8,6 +8,7 @@ import importlib
 import io
 import ipaddress
 import logging
+import math
 import secrets
 import sys
 import threading
@@ -21,7 +22,7 @@ from urllib.parse import urlsplit
 
 import numpy as np
 
-from scripts.live.drawn import LOG_BOUNDS, look_at
+from scripts.live.drawn import look_at
 from scripts.live.messages import Controls, Seldom
 from slam.errors import InvalidValueError, MissingDependencyError
 
@@ -232,16 +233,17 @@ def require() -> Any:
         ) from error
 
 
-PANEL = 0.3  # of a room's width: so much more is left for the panel at its right
-# viser's panel covers most of a phone: there it begins as a strip, whose handle opens half of it.
-# A browser captures a finger for what it touches, which viser takes for a drag: no tap would click.
-PHONE = Path(__file__).with_name("phone.html")
+# Light or dark as the browser is, and how our words look. viser's panel covers most of a phone:
+# there it begins as a strip, whose handle opens half of it. A browser captures a finger for what it
+# touches, which viser takes for a drag: no tap would click.
+HEAD = Path(__file__).with_name("head.html")
+WIDE = 1.2  # of a page before it says: width by height
 
 
 def page_of(viser: Any) -> bytes:
     """The page that viser's wheel brings: one file, whole without a net."""
     page = (Path(viser.__file__).parent / "client" / "build" / "index.html").read_bytes()
-    return page.replace(b"</head>", PHONE.read_bytes() + b"</head>", 1)
+    return page.replace(b"</head>", HEAD.read_bytes() + b"</head>", 1)
 
 
 class Served:
@@ -257,14 +259,12 @@ class Served:
         host = hidden_host()
         with contextlib.redirect_stdout(io.StringIO()):  # it prints where it listens
             self._viser = viser.ViserServer(host, port=0, label=title, verbose=False)
-        self._bounds: Sequence[float] = LOG_BOUNDS
         self.controls = Controls()
         secret = secrets.token_urlsafe(16)
         _only_from_gate(self._viser, secret)
         self.scene, self.gui = self._viser.scene, self._viser.gui
-        self.camera = self._viser.initial_camera
-        self._viser.on_client_connect(self._turn_for_phone)
         self.gui.configure_theme(show_logo=False, show_share_button=False, control_width="medium")
+        self.gui.main_panel.dock_right()
         self.behind = behind = (host, int(self._viser.get_port()))
         try:
             self._gate = Gate(
@@ -281,25 +281,22 @@ class Served:
         """What the address must hold, where others can reach it; else empty."""
         return self._gate.rules.token
 
-    def look_at(self, bounds: Sequence[float]) -> None:
-        """Let pages that come show that room."""
-        self._bounds = bounds
-        xmin, ymin, xmax, ymax = bounds
-        look_at(self.camera, (xmin, ymin, xmax + PANEL * (xmax - xmin), ymax))
+    def look_at(self, bounds: Callable[[], Sequence[float]]) -> None:
+        """Let pages that come show that room, as wide as they are until somebody moves them."""
+        look_at(self._viser.initial_camera, bounds(), WIDE)
 
-    def _turn_for_phone(self, client: Any) -> None:
-        """Once a page shows the first view, turn it where the screen is upright."""
+        def fit(client: Any) -> None:
+            before, seen = self._viser.initial_camera.position, math.nan
 
-        @client.camera.on_update  # type: ignore[untyped-decorator]
-        def _(camera: Any) -> None:
-            first = np.allclose(camera.position, self.camera.position, atol=0.01)
-            if first and camera.aspect < 1.0:
-                look_at(camera, self._bounds, upright=True)
+            @client.camera.on_update  # type: ignore[untyped-decorator]
+            def _(camera: Any) -> None:
+                nonlocal before, seen
+                if camera.aspect != seen and np.allclose(camera.position, before, atol=0.01):
+                    seen = camera.aspect
+                    look_at(camera, bounds(), seen)
+                    before = camera.position
 
-    def clients(self) -> dict[int, Any]:
-        """Who is there, as viser's handles."""
-        found: dict[int, Any] = self._viser.get_clients()
-        return found
+        self._viser.on_client_connect(fit)
 
     def close(self) -> None:
         """Stop listening."""

@@ -74,7 +74,7 @@ class Session:
         verdict = verdict_of(self.moments.replay.tracks[primary].estimates[-1])
         if verdict != self._verdict:
             self._verdict = verdict
-            said = [*said, f"{primary}: {verdict}"]
+            said = [*said, f"{self.moments.seconds:.1f} s: {primary}: {verdict}"]
         return said
 
     def _begun(self) -> list[str]:

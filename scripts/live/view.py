@@ -2,7 +2,7 @@
 """The loop of a live view: takes requests, makes moments at their pace and draws them."""
 
 import time
-from collections.abc import Iterator, Sequence
+from collections.abc import Callable, Iterator, Sequence
 from typing import Any
 
 from scripts import interrupt
@@ -17,6 +17,7 @@ from scripts.live.playback import (
     OnWorld,
     Pace,
     Playback,
+    Request,
     Seek,
     Speed,
 )
@@ -60,7 +61,6 @@ TAKES = (
     (Topic(name="/mobilia/door", kind=_STRING), _door),
     (Topic(name="/mobilia/kidnap", kind=_STRING), lambda message: Kidnap(goal=message.data)),
 )
-SILENCE_S = 1.0  # between two complaints: a stream of bad messages does not flood the page
 
 
 class Network:
@@ -69,8 +69,6 @@ class Network:
     def __init__(self, link: Link) -> None:
         self._link, self._robot = link, Robot(link)
         self._sent = -1
-        self._refused: str | None = None
-        self._told_s = -SILENCE_S
         for topic, _ in TAKES:
             link.subscribe(topic)
 
@@ -85,26 +83,14 @@ class Network:
         self._sent = -1
         self._robot.restart(static_map, height_m)
 
-    def requests(self) -> Iterator[OnWorld]:
-        """What others ask for, of each topic the last; what cannot be is kept for ``refused``."""
+    def requests(self, refuse: Callable[[object], None]) -> Iterator[OnWorld]:
+        """What others ask for, of each topic the last; ``refuse`` is told what cannot be."""
         for topic, read in TAKES:
             for taken in self._link.take(topic)[-1:]:
                 try:
                     yield read(decoded(topic.kind, taken.data))
                 except MobiliaError as error:
-                    self.refuse(f"{topic.name}: {error}")
-
-    def refuse(self, why: str) -> None:
-        """Keep this to be told."""
-        self._refused = f"ROS 2: {why}"
-
-    def refused(self) -> str | None:
-        """What is to be told, once a ``SILENCE_S`` at most."""
-        now_s = time.monotonic()
-        if self._refused is None or now_s - self._told_s < SILENCE_S:
-            return None
-        said, self._refused, self._told_s = self._refused, None, now_s
-        return said
+                    refuse(f"ROS 2: {topic.name}: {error}")
 
     def close(self) -> None:
         """Leave the network."""
@@ -112,6 +98,7 @@ class Network:
 
 
 IDLE_S = 0.05  # between two looks at the inbox while nothing moves
+SILENCE_S = 1.0  # between two complaints: a stream of bad messages does not flood the page
 
 
 class View:
@@ -124,7 +111,7 @@ class View:
         self, opener: Opener, address: tuple[str, int], origins: Sequence[str] = (), *,
         playing: bool = True, speed: float = 1.0, network: Network | None = None,
     ) -> None:  # fmt: skip
-        self._network = network
+        self._network, self._told_s = network, -SILENCE_S
         self._opener, self._inbox, self._pace = opener, Inbox(), Pace()
         self.session = opener.open()
         self.served = Served(address, self.session.footage.title, origins)
@@ -138,7 +125,7 @@ class View:
             },
         )  # fmt: skip
         self._begin(playing=playing, speed=speed)
-        self.served.look_at(self._drawn.bounds)
+        self.served.look_at(lambda: self._drawn.bounds)
 
     def _begin(self, *, playing: bool, speed: float) -> None:
         """Show the session from its start."""
@@ -193,8 +180,11 @@ class View:
     def _wait(self, seconds: float) -> bool:
         """Do a request that is there, or comes meanwhile; whether there was one."""
         request = self._inbox.get(seconds)
-        if request is None:
-            return False
+        if request is not None:
+            self._do(request)
+        return request is not None
+
+    def _do(self, request: Request) -> None:
         try:
             if isinstance(request, OnView):
                 self._at(request)
@@ -204,7 +194,6 @@ class View:
                 self._touch(request)
         except MobiliaError as error:
             self._inbox.refuse(error)
-        return True
 
     def _at(self, request: OnView) -> None:
         self.playback.do(request)
@@ -235,26 +224,21 @@ class View:
         drove = hands.client_drives
         done = hands.do(request)
         if hands.client_drives != drove or not isinstance(request, Drive):
-            self._page.say(f"you: {done}")
+            self._page.say(f"you: {done}", own=True)
         if playback.shown is not None:
             self._page.show(playback.shown, playback, self.session)
 
     def _from_network(self) -> None:
         """Do what others on the network ask for, just before the next scan."""
-        if self._network is None:
-            return
-        for request in self._network.requests():
-            try:
-                self._touch(request)
-            except MobiliaError as error:
-                self._network.refuse(str(error))
+        if self._network is not None:
+            for request in self._network.requests(self._inbox.refuse):
+                self._do(request)
 
     def _tell(self) -> None:
         """What was refused, and that the run has ended."""
-        said = self._inbox.refused()
-        if said is None and self._network is not None:
-            said = self._network.refused()
-        if said is not None:
+        now_s = time.monotonic()
+        if now_s - self._told_s >= SILENCE_S and (said := self._inbox.refused()) is not None:
+            self._told_s = now_s
             self._page.say(said)
         if self.playback.ended and not self._told_end:
             self._told_end = True

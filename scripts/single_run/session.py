@@ -250,7 +250,9 @@ def _draw(folder: Path, show: Show, found: Drawn | None) -> None:
     if truth is not None:
         figures.errors(folder / "errors.png", online, truth)
     raster = None if found is None else found.map
-    figures.trajectories(folder / "trajectories.png", online, truth, raster, show.truth_name)
+    figures.trajectories(
+        folder / "trajectories.png", online, truth, raster, show.moments.truth_name
+    )
     if found is None:
         return
     figures.map_picture(folder / "map.png", found.map, own, show.last_points_map)

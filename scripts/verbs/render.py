@@ -136,7 +136,13 @@ class Render:
                 if recorder is not None:
                     recorder.note(show.shown)
             if self.strip_to is not None:
-                strip(snapshots.finish(), moments, self.strip_to, columns=3, legend=show.legend())
+                strip(
+                    snapshots.finish(),
+                    moments,
+                    self.strip_to,
+                    columns=3,
+                    legend=show.moments.legend(),
+                )
         wall_s = time.perf_counter() - started
         if reel is not None and out is not None:
             long_s = reel.frames / show.pace.fps

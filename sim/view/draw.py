@@ -27,7 +27,8 @@ GRID: Color = (226, 228, 232)
 BLUE: Color = (31, 97, 190)  # the paper's raw LIDAR
 ORANGE: Color = (222, 110, 24)  # odometry
 GREEN: Color = (22, 140, 90)  # truth
-RED: Color = (206, 44, 60)  # the SLAM's estimate
+RED: Color = (206, 44, 60)  # the SLAM's estimate; lost
+AMBER: Color = (184, 108, 0)  # unsure
 # what a beam hit
 AZURE: Color = (18, 116, 255)  # static
 TEAL: Color = (0, 150, 158)  # semi-static

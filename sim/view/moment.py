@@ -9,11 +9,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from sim.view.draw import colors_of
+from sim.view import draw
+from sim.view.draw import Color, colors_of
 from sim.view.parts import Placed
-from sim.view.scans import beams
+from sim.view.scans import LEGEND, beams
 from slam import se2
 from slam.estimate import Estimate, Landmarks, Raster
+from slam.evaluation.lost import LOST_M, LOST_RAD
 from slam.frames import NS_PER_S, Float, Frame
 from slam.rasters import joined, trimmed
 from slam.replay import Replay, Track, primary_of
@@ -26,6 +28,7 @@ MOST_POINTS = 1500  # of a path as drawn
 SIGMAS = 3.0  # of the ellipses
 CLAIM = 2.0  # sigmas of what a track claims of its error
 RING = 36  # corners of an ellipse
+DOUBTS: dict[str, Color] = {"unsure": draw.AMBER, "lost": draw.RED}
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -59,10 +62,23 @@ class Shown:
         """Of the primary track."""
         return self.estimates[self.primary]
 
-    @property
-    def verdict(self) -> str:
-        """What the primary track says of itself."""
-        return verdict_of(self.own)
+    def told(self) -> list[tuple[str, Color]]:
+        """What the primary track says of itself and, where the truth is known, how far off it is.
+
+        Green is a pose that claims not to be lost, unless the truth lies beyond its ellipse.
+        """
+        own, word = self.own, verdict_of(self.own)
+        sigma_m = claims(own.covariance)[0] / CLAIM
+        color = DOUBTS.get(word, draw.GREEN if sigma_m else draw.AMBER)
+        claim = f"± {draw.measured(sigma_m)} (1 σ)" if sigma_m else "no covariance"
+        if self.truth_map is None:
+            return [(f"{word}, {claim}", color)]
+        off, sigmas = off_by((own.T_map_robot - self.truth_map)[:2], own.covariance[:2, :2])
+        refuted = sigmas > SIGMAS
+        return [
+            (f"{word}, {claim}", draw.RED if refuted else color),
+            (off, draw.RED if refuted else draw.INK),
+        ]
 
     def error(self, name: str) -> tuple[float, float]:
         """(m, rad wrapped) that a track is off, NaN without truth."""
@@ -123,17 +139,22 @@ class Moments:
     paths      in the map frame, by track and "truth"
     colors     by track and "truth"
     T_world_map  of the map frame; None: the first frame's truth
+    truth_name  what the truth is called
     seconds    of the last moment
     moved      how often the primary track has moved its map
+    labelled   whether beams say what they hit
     """
 
-    def __init__(self, replay: Replay, T_world_map: Float | None = None) -> None:
-        self.T_world_map = T_world_map
+    def __init__(
+        self, replay: Replay, T_world_map: Float | None = None, truth_name: str = "truth"
+    ) -> None:
+        self.T_world_map, self.truth_name = T_world_map, truth_name
         self.replay, self.primary = replay, primary_of(replay)
         self.paths: dict[str, Path] = {name: Path() for name in ("truth", *replay.tracks)}
         self.colors = colors_of(list(replay.tracks))
         self._first_ns: int | None = None
         self._number, self.seconds, self.moved = -1, 0.0, 0
+        self.labelled = False
         self._looked_s = -math.inf
         self._map: tuple[Raster | None, Landmarks | None] = None, None
 
@@ -142,12 +163,25 @@ class Moments:
         """The primary one."""
         return self.replay.tracks[self.primary]
 
+    def named(self) -> list[tuple[str, Color]]:
+        """Whose colour is which: the tracks, then the truth where it is known."""
+        names = {name: name for name in self.replay.tracks}
+        if self.truth_name and not np.isnan(self.paths["truth"].pose[0]):
+            names["truth"] = self.truth_name
+        return [(short(word), self.colors[name]) for name, word in names.items()]
+
+    def legend(self) -> list[tuple[str, Color]]:
+        """The same, and what the colours of the beams say."""
+        beams = LEGEND if self.labelled else ()
+        return self.named() + [(f"scan: {word}", color) for word, color in beams]
+
     def note(self, frame: Frame, placed: Placed | None = None, said: Sequence[str] = ()) -> Shown:
         """The moment of a frame that every track has just taken; call it for each."""
         if self._first_ns is None:
             self._first_ns = frame.stamp_ns
             self.T_world_map = frame.truth if self.T_world_map is None else self.T_world_map
         self._number += 1
+        self.labelled = self.labelled or frame.labels is not None
         self.seconds = (frame.stamp_ns - self._first_ns) / NS_PER_S
         truth_map = None
         if self.T_world_map is not None and frame.truth is not None:
@@ -198,6 +232,11 @@ class Moments:
             path.add(pose)
 
 
+def short(word: str) -> str:
+    """Of a long command, its two ends."""
+    return word if len(word) <= 28 else f"{word[:10]}…{word[-12:]}"
+
+
 def small_map(track: Track) -> Raster | None:
     """What is known of a map, each cell the largest of several where it has too many for a
     picture: a thin wall stays."""
@@ -209,9 +248,28 @@ def small_map(track: Track) -> Raster | None:
 
 
 def verdict_of(estimate: Estimate) -> str:
-    """What a SLAM says of itself: tracking, map outdated here, frozen, lost; or not sure."""
-    usual = "tracking" if estimate.converged else "not sure"
-    return str(estimate.diagnostics.get("state", usual))
+    """What a SLAM says of itself: tracking (relocated, map outdated here), unsure or lost.
+
+    Unsure is what does not trust its pose, or claims ``CLAIM`` sigma at which a run is lost.
+    """
+    state, claim = str(estimate.diagnostics.get("state", "tracking")), claims(estimate.covariance)
+    if state in DOUBTS:
+        return state
+    sure = estimate.converged and claim[0] <= LOST_M and claim[1] <= LOST_RAD
+    return state if sure else "unsure"
+
+
+def off_by(error: Float, covariance: Float) -> tuple[str, float]:
+    """How far off, and how many of its own sigmas that is: ``1.7 cm off, 1.2 σ``; NaN of these
+    where none are claimed.
+
+    error (2,) m and covariance (2, 2) m^2 in one frame.
+    """
+    word = f"{draw.measured(math.hypot(*error.tolist()))} off"
+    if not np.linalg.det(covariance) > 0.0:
+        return word, math.nan
+    sigmas = math.sqrt(max(float(error @ np.linalg.solve(covariance, error)), 0.0))
+    return f"{word}, {sigmas:.1f} σ", sigmas
 
 
 def claims(covariance: Float) -> tuple[float, float]:

@@ -208,14 +208,6 @@ def test_an_unwritable_place_leaves_nothing(tmp_path):
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "map.pgm"]
 
 
-def test_the_picture_tells_unknown_from_known():
-    picture = maps.raster_image(small_map())
-    free, unknown, solid = picture[2, 0], picture[1, 0], picture[0, 0]
-    assert free.min() > 240
-    assert solid.max() < 70
-    assert unknown.max() - unknown.min() < 12
-
-
 def test_a_raster_without_cells_is_no_map(tmp_path):
     empty = Raster(values=np.zeros((0, 4)), resolution_m=0.05, T_map_origin=[0.0, 0.0, 0.0])
     with pytest.raises(InvalidValueError, match="needs 1 to"):

@@ -4,7 +4,7 @@
 import numpy as np
 import pytest
 
-from scripts.film.map_pane import CloseUp, off_by, raster_picture
+from scripts.film.map_pane import CloseUp, raster_picture
 from sim.view.draw import GREEN, INK, PAPER, RED, View, robot, scale_bar
 from sim.view.moment import MOST_POINTS, Path
 from slam import se2
@@ -58,16 +58,6 @@ def test_the_close_up_shows_truth_and_estimate_however_far_apart():
         assert (picture[75, 75] == RED).all()
         if gap > 0.0:
             assert (picture == GREEN).all(axis=2).any()
-
-
-@pytest.mark.parametrize(
-    ("error", "variances", "says"),
-    [((0.02, 0.0), (1e-4, 4e-4), "2.0 cm off, 2.0 σ"),
-     ((0.0, 1.5), (1e-4, 4e-4), "1.50 m off, 75.0 σ"),
-     ((0.02, 0.0), (0.0, 0.0), "2.0 cm off")],
-)  # fmt: skip
-def test_how_far_off_is_told_in_its_own_sigmas(error, variances, says):
-    assert off_by(np.array(error), np.diag(variances)) == says
 
 
 def test_the_scale_bar_keeps_clear_of_the_map():

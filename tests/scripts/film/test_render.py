@@ -129,7 +129,7 @@ def test_a_log_without_truth_is_filmed_without_it(tmp_path: Path):
         show = footage.show(["odometry"])
         (picture,) = pictures_at(footage.stream, show, [0.9], whole=True)
     assert (picture == BLUE).all(axis=2).sum() > 100
-    assert [name for name, _ in show.named()] == ["odometry"]
+    assert [name for name, _ in show.moments.named()] == ["odometry"]
     assert not (picture == GREEN).all(axis=2).any()
     assert not (picture == MAGENTA).all(axis=2).any()
 

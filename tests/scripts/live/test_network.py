@@ -10,7 +10,7 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.live.playback import Drive, Kidnap, MoveDoor, Push
+from scripts.live.playback import Drive, Inbox, Kidnap, MoveDoor, Push
 from scripts.live.session import Hands, Opener
 from scripts.live.view import TAKES, Network
 from sim.moments import Moment
@@ -51,7 +51,7 @@ def word(text: str) -> Taken:
 
 
 def test_messages_are_what_a_page_may_ask_for(network):
-    network, link = network
+    (network, link), inbox = network, Inbox()
     there = PoseMessage()(0, np.array([1.0, 2.0, 0.5]), np.eye(3))
     link.come |= {
         "/cmd_vel": [twist(9.0), twist(0.3, 0.1)],
@@ -59,13 +59,13 @@ def test_messages_are_what_a_page_may_ask_for(network):
         "/mobilia/push": [word("")],
         "/mobilia/door": [word("shut door:1")],
     }
-    assert list(network.requests()) == [
+    assert list(network.requests(inbox.refuse)) == [
         Drive(v=0.3, omega=0.1), Kidnap(pose=(1.0, 2.0, 0.5)), Push(name=""),
         MoveDoor(opened=False, name="door:1"),
     ]  # fmt: skip
-    assert network.refused() is None
+    assert inbox.refused() is None
     link.come[TAKES[1][0]] = [stamped(0.2)]
-    assert list(network.requests()) == [Drive(v=0.2, omega=0.0)]
+    assert list(network.requests(inbox.refuse)) == [Drive(v=0.2, omega=0.0)]
 
 
 @pytest.mark.parametrize(
@@ -78,11 +78,11 @@ def test_messages_are_what_a_page_may_ask_for(network):
     ],
 )
 def test_what_cannot_be_is_left_out_and_said(network, topic, taken, match):
-    network, link = network
+    (network, link), inbox = network, Inbox()
     link.come[topic] = [taken]
-    assert list(network.requests()) == []
-    assert match in network.refused()
-    assert network.refused() is None
+    assert list(network.requests(inbox.refuse)) == []
+    assert match in inbox.refused()
+    assert inbox.refused() is None
 
 
 def test_a_twist_moves_the_robot(network):
@@ -92,7 +92,7 @@ def test_a_twist_moves_the_robot(network):
     before = next(moments).frame.truth
     for _ in range(30):
         link.come["/cmd_vel"] = [twist(0.3)]
-        for request in network.requests():
+        for request in network.requests(Inbox().refuse):
             hands.do(request)
         after = next(moments).frame.truth
     assert np.hypot(*(after - before)[:2]) > 0.1

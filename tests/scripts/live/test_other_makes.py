@@ -38,7 +38,7 @@ def driven_m(session: Session, link: Link, child: "subprocess.Popen[str]") -> fl
     for shown in session.run():
         network.send(shown)
         time.sleep(1.0 / 37.5)
-        for request in network.requests():
+        for request in network.requests(print):
             session.hands.do(request)
         if child.poll() is not None:
             break

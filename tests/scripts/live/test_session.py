@@ -4,11 +4,16 @@
 import math
 from dataclasses import replace
 from itertools import islice
+from types import SimpleNamespace
+from unittest.mock import MagicMock
 
 import numpy as np
 import pytest
 
-from scripts.live.playback import Anew, Click, Drive
+from scripts.live.drawn import SPARE, look_at
+from scripts.live.messages import Controls
+from scripts.live.page import Page
+from scripts.live.playback import Anew, Click, Drive, Inbox, Playback
 from scripts.live.session import KEPT, Hands, Opener
 from sim.moments import toured
 from sim.recording.episode import record
@@ -145,3 +150,36 @@ def test_a_bag_is_shown_with_its_truth_and_labels(tmp_path):
     assert shown[0].frame.labels is not None
     assert shown[-1].truth_map is not None
     assert shown[-1].error("odometry")[0] < 0.05
+
+
+def test_what_one_did_oneself_stays_when_much_happens():
+    session = Opener(slams=["odometry"], settings={"scene": "arena"}, seconds=1.0).open()
+    moment, gui = next(session.run()), MagicMock()
+    gui.add_html.side_effect = lambda content: SimpleNamespace(content=content)
+    page = Page(gui, MagicMock(), Controls(), Inbox(), {"room": False, "slam": "odometry"})
+    page.say("you: <chair> is pushed", own=True)
+    for k in range(20):
+        page.show(
+            replace(moment, number=k, said=(f"door{k} moves",)),
+            Playback(iter(()), playing=False),
+            session,
+        )
+    assert "you: &lt;chair&gt; is pushed" in page._answers.content
+    assert "door19 moves" in page._events.content
+    assert "door9 " not in page._events.content
+
+
+@pytest.mark.parametrize("bounds", [(0.0, 0.0, 20.0, 12.0), (-3.0, 5.0, 4.0, 30.0)])
+@pytest.mark.parametrize("aspect", [0.46, 1.2, 1.7])
+def test_a_room_fills_a_page_of_any_shape_and_nothing_of_it_is_cut(bounds, aspect):
+    camera = SimpleNamespace()
+    look_at(camera, bounds, aspect)
+    at, to = np.array(camera.position), np.array(camera.look_at)
+    ahead = (to - at) / np.linalg.norm(to - at)
+    right = np.cross(ahead, (0.0, 0.0, 1.0)) / np.linalg.norm(ahead[:2])
+    xmin, ymin, xmax, ymax = bounds
+    corners = np.array([(x, y, z) for x in (xmin, xmax) for y in (ymin, ymax) for z in (0.0, 1.0)])
+    local = (corners - at) @ np.stack([right, np.cross(right, ahead), ahead], axis=1)
+    assert to[2] == pytest.approx(0.0)
+    shares = np.abs(local[:, :2] / local[:, 2:]) / np.array([aspect, 1.0])
+    assert shares.max() == pytest.approx(SPARE * math.tan(0.5 * camera.fov))
