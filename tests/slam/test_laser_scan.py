@@ -2,6 +2,7 @@
 """A scan has the numbers of the message that a bag and a ROS node say it by."""
 
 import math
+from typing import Any
 
 import numpy as np
 import pytest
@@ -25,11 +26,11 @@ def scan(times: np.ndarray) -> Scan:
     return Scan(stamp_ns=5, ranges=ranges, intensities=2.0 * ranges, spec=spec)
 
 
-def message(said: Scan):
+def message(said: Scan) -> Any:
     """The sensor_msgs/LaserScan of the whole scan."""
     frame = Frame(stamp_ns=5, odometry=Odometry(stamp_ns=5, T_odom_robot=np.zeros(3)), scan=said)
     whole = next(FrameMessages(said.spec, intensities=True).scans(frame))
-    return STORE.deserialize_cdr(whole.data, "sensor_msgs/msg/LaserScan")
+    return STORE.deserialize_cdr(bytes(whole.data), "sensor_msgs/msg/LaserScan")
 
 
 BEAMS = np.arange(61)
@@ -37,7 +38,7 @@ ALONG = BEAMS * STEP / math.tau
 
 
 @pytest.mark.parametrize("times", [ALONG, ALONG + BEAMS % 2, 0.0 * ALONG])
-def test_a_scan_has_the_names_of_its_message(times: np.ndarray):
+def test_a_scan_has_the_names_of_its_message(times: np.ndarray) -> None:
     mine = scan(times)
     theirs = message(mine)
     for name in (*NAMES, "ranges", "intensities"):
@@ -45,7 +46,7 @@ def test_a_scan_has_the_names_of_its_message(times: np.ndarray):
     np.testing.assert_allclose(mine.angle_min + BEAMS * mine.angle_increment, mine.spec.angles)
 
 
-def test_one_time_for_all_beams_is_said_only_where_it_is_true():
+def test_one_time_for_all_beams_is_said_only_where_it_is_true() -> None:
     steady = scan(ALONG)
     assert steady.time_increment == pytest.approx(message(steady).time_increment, rel=1e-6)
     ends = BEAMS * steady.time_increment
