@@ -30,6 +30,7 @@ from slam.checked import (
     stamp,
 )
 from slam.errors import InvalidValueError
+from slam.laser_scan import LaserScanNames
 
 NS_PER_S = 1_000_000_000
 EPOCH = "epoch_ns"  # of ``StreamMetadata.extra``
@@ -162,8 +163,8 @@ class LaserSpec(ByContent):
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
-class Scan(ByContent):
-    """One laser scan.
+class Scan(LaserScanNames, ByContent):
+    """One laser scan. It has the names of sensor_msgs/LaserScan, too (``slam.laser_scan``).
 
     stamp_ns     time of the earliest beam, ns
     ranges       (n_beams,) float32 m; REP 117: +inf no return, NaN an error code, never -inf. 0

@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-"""docs/bring_your_own.md does what it says: its blocks are run in order, in an empty folder."""
+"""docs/bring_your_own.md and docs/jobs/my_slam.md do what they say, in an empty folder."""
 
 import csv
 import json
@@ -8,6 +8,8 @@ import re
 import shlex
 import shutil
 import subprocess
+import sys
+from collections.abc import Iterator
 from pathlib import Path
 
 import numpy as np
@@ -24,7 +26,7 @@ pytestmark = pytest.mark.docs
 REPO = Path(__file__).resolve().parents[1]
 EXAMPLES = REPO / "docs" / "examples"
 PAGE = (REPO / "docs" / "bring_your_own.md").read_text()
-BLOCKS = re.findall(r"```(\w+)\n(.*?)```", PAGE, flags=re.DOTALL)
+JOB = (REPO / "docs" / "jobs" / "my_slam.md").read_text()
 
 
 def run(*command: str, cwd: Path) -> str:
@@ -36,28 +38,54 @@ def run(*command: str, cwd: Path) -> str:
     return done.stdout
 
 
-def test_the_page_runs_from_top_to_bottom(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
-    (tmp_path / "docs").symlink_to(REPO / "docs")
+def blocks(page: str) -> list[tuple[str, str]]:
+    """The blocks of a page: language, text."""
+    return re.findall(r"```(\w+)\n(.*?)```", page, flags=re.DOTALL)
+
+
+def mobilia(line: str) -> str:
+    """What the command prints, in one line."""
+    done = CliRunner().invoke(app, shlex.split(line)[1:], catch_exceptions=False)
+    assert done.exit_code == 0, done.output
+    return " ".join(done.output.split())
+
+
+@pytest.fixture
+def folder(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> Iterator[Path]:
+    """An empty folder to stand in, whose modules can be imported."""
     monkeypatch.chdir(tmp_path)
     monkeypatch.syspath_prepend(tmp_path)
-    languages = [language for language, _ in BLOCKS]
-    assert languages == ["python", "sh", "python", "python", "sh", "sh", "json"]
+    yield tmp_path
+    sys.modules.pop("my_slam", None)
+
+
+def test_the_class_of_the_job_says_what_the_page_says(folder: Path):
+    """Its first two runs, as printed; ``blame`` takes a minute, and has tests of its own."""
+    (_, code), (_, run_it), (_, printed), (_, in_a_crowd), (_, in_the_crowd) = blocks(JOB)[:5]
+    (folder / "my_slam.py").write_text(code)
+    assert printed.strip() in mobilia(run_it)
+    assert in_the_crowd.strip() in mobilia(in_a_crowd)
+
+
+def test_the_page_runs_from_top_to_bottom(folder: Path):
+    (folder / "docs").symlink_to(REPO / "docs")
+    languages = [language for language, _ in blocks(PAGE)]
+    assert languages == ["python", "sh", "python", "sh", "sh", "json"]
     printed = ""
-    for language, block in BLOCKS:
+    for language, block in blocks(PAGE):
         named = re.match(r"# (\w+\.py)\n", block)
         if named:
-            (tmp_path / named[1]).write_text(block)
+            (folder / named[1]).write_text(block)
         elif language == "python":
             exec(block, {})
         elif block.startswith(".venv/bin/mobilia"):
-            done = CliRunner().invoke(app, shlex.split(block)[1:], catch_exceptions=False)
-            assert done.exit_code == 0, done.output
+            mobilia(block)
         elif language == "sh":
-            printed = run("sh", "-ec", block, cwd=tmp_path)
+            printed = run("sh", "-ec", block, cwd=folder)
         else:
             assert printed == block
-    assert json.loads((tmp_path / "out/mine/results.json").read_text())["slams"]["my_slam:MySlam"]
-    rows = list(csv.DictReader((tmp_path / "out/compare/runs.csv").read_text().splitlines()))
+    assert json.loads((folder / "out/mine/results.json").read_text())["slams"]["my_slam:MySlam"]
+    rows = list(csv.DictReader((folder / "out/compare/runs.csv").read_text().splitlines()))
     assert {row["outcome"] for row in rows} == {"finished"}
     assert len({row["ate_unaligned_m"][:9] for row in rows}) == 1  # all believe the wheels
 

@@ -12,18 +12,12 @@ from types import ModuleType
 import numpy as np
 
 from slam import se2
-from slam.errors import (
-    InvalidValueError,
-    MissingDependencyError,
-    MobiliaError,
-    SlamFailedError,
-)
+from slam.errors import InvalidValueError, MissingDependencyError
 from slam.estimate import Estimate
 from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction, predict
-from slam.interface import told
 from slam.path import OnPath, PosePath
 
 SPACING_AT_M = 10.0  # m; there a voxel is as wide as two beams are apart
@@ -133,8 +127,8 @@ class Guest(OnPath, ABC):
 
     It gets each scan's end points, de-skewed by odometry as "shunting" gets them, and odometry's
     guess of the pose. Guests report no covariance of their own that means anything, so theirs is
-    zero: no claim. Raises ``InvalidValueError`` for frames without a scan or out of order, and
-    ``SlamFailedError`` for a pose that is not finite.
+    zero: no claim. Raises ``InvalidValueError`` for frames without a scan or out of order, and for
+    what is no pose.
     """
 
     def __init__(self) -> None:
@@ -155,26 +149,17 @@ class Guest(OnPath, ABC):
         prediction = predict(self._T_map_robot, before, frame.odometry)
         if self._before is None:
             self.begin(frame.scan.spec)
-            twist = np.zeros(3) if frame.odometry.twist is None else frame.odometry.twist
-        else:
-            twist = prediction.twist
-        points_robot = from_scan(frame.scan, np.asarray(twist), _GRAIN).points_robot
-        try:
-            T_map_robot, diagnostics = self.locate(points_robot, prediction)
-        except MobiliaError:
-            raise
-        except Exception as error:  # somebody else's code raises whatever it likes
-            raise SlamFailedError(f"{type(self).__name__}: {told(error)}") from error
-        if not np.isfinite(T_map_robot).all():
-            raise SlamFailedError(f"{type(self).__name__} ended at {T_map_robot.tolist()}", "nan")
-        self._before, self._T_map_robot = frame.odometry, T_map_robot
-        self._path.add(frame.stamp_ns, T_map_robot)
-        return Estimate(
+        points_robot = from_scan(frame.scan, prediction.twist, _GRAIN).points_robot
+        T_map_robot, diagnostics = self.locate(points_robot, prediction)
+        estimate = Estimate(
             stamp_ns=frame.stamp_ns,
             T_map_robot=T_map_robot,
             covariance=np.zeros((3, 3)),
             diagnostics=diagnostics,
         )
+        self._before, self._T_map_robot = frame.odometry, np.array(estimate.T_map_robot)
+        self._path.add(frame.stamp_ns, self._T_map_robot)
+        return estimate
 
     @abstractmethod
     def begin(self, spec: LaserSpec) -> None:

@@ -13,6 +13,7 @@ from slam._jit import njit
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float, Frame, LaserSpec, Odometry
+from slam.laser_scan import turn_time_s, turns_of
 from slam.ros import messages as ros
 from slam.ros.link import Topic
 
@@ -108,8 +109,8 @@ class _Scans:
     """The scans of one scanner, whole and turn by turn."""
 
     def __init__(self, spec: LaserSpec, number: int, *, intensities: bool) -> None:
-        self.spec, turns = spec, ros.turns_of(spec)
-        turn_s = ros.turn_time_s(spec, turns)
+        self.spec, turns = spec, turns_of(spec)
+        turn_s = turn_time_s(spec, turns)
         whole, turn = (topic.name for topic in scan_topics(number))
         parts = [(whole, ros.Part(turns * turn_s, 0, 1))]
         parts += [(turn, ros.Part(turn_s, k, turns)) for k in range(turns)]

@@ -16,9 +16,9 @@ from typing import NamedTuple
 
 import numpy as np
 
-from slam.errors import InvalidValueError
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float, LaserSpec, Odometry, Scan
+from slam.laser_scan import is_clockwise
 from slam.logs.ros_numbers import quaternion_of
 from slam.ros.template import Marks, Template, header, marked_time, message
 
@@ -86,43 +86,6 @@ WORLD, MAP, ODOM = "world", "map", "odom"
 FOOTPRINT, ROBOT, LASER = "base_footprint", "base_link", "laser"
 TRUE_FOOTPRINT = "base_footprint_truth"  # where the robot is, whoever says what of "map" and "odom"
 UNKNOWN = -1.0  # first entry of a covariance: there is no such measurement (sensor_msgs/Imu)
-
-
-def turns_of(spec: LaserSpec) -> int:
-    """Mirror turns of a scan: the beams of each turn are every n-th, evenly spaced in time.
-
-    Raises ``InvalidValueError`` for beam times that no number of turns explains.
-    """
-    offsets_ns = np.round(spec.beam_time_offsets * NS_PER_S)
-    if is_clockwise(spec):
-        offsets_ns = offsets_ns[::-1]
-    for turns in range(1, min(9, spec.n_beams + 1)):
-        steps = offsets_ns[turns:] - offsets_ns[:-turns]
-        if steps.size == 0 or (steps.min() >= 0.0 and steps.max() - steps.min() <= 2.0):
-            return turns
-    raise InvalidValueError("LaserSpec.beam_time_offsets are not those of a turning mirror")
-
-
-def is_clockwise(spec: LaserSpec) -> bool:
-    """Whether the leftmost beam is measured first: such a scan is written clockwise."""
-    return bool(spec.beam_time_offsets[0] > spec.beam_time_offsets[-1])
-
-
-def turn_time_s(spec: LaserSpec, turns: int) -> float:
-    """Seconds of one turn of the mirror; 0 where the beams have no times."""
-    if spec.n_beams <= turns:
-        return 0.0
-    last = ((spec.n_beams - 1) // turns) * turns
-    offsets = spec.beam_time_offsets[::-1] if is_clockwise(spec) else spec.beam_time_offsets
-    sweep = float(offsets[last])
-    if sweep <= 0.0:
-        return 0.0
-    turn = sweep * math.tau / (last * spec.angle_increment)
-    for digits in range(9):  # offsets are whole nanoseconds: the roundest rate that they can mean
-        rate = round(1.0 / turn, digits)
-        if rate > 0.0 and abs(1.0 / rate - turn) <= turn * 1e-9 / sweep:
-            return 1.0 / rate
-    return turn
 
 
 class Part(NamedTuple):

@@ -25,9 +25,9 @@ from sim.sensors.lidar.models.lms221 import Lms221Config
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import NS_PER_S, BeamClass, Frame, LaserSpec, Odometry, Scan
+from slam.laser_scan import turns_of
 from slam.logs import read_bag
 from slam.maps import read_map
-from slam.ros.messages import turns_of
 from slam.ros.template import EPOCH_NS
 from slam.trajectory import read_tum
 
