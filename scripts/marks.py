@@ -15,7 +15,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, MissingPathError
 from slam.files import write_text
 
 MOST_CELLS = 40  # of a table on a page
@@ -44,6 +44,13 @@ def filled(text: str, name: str, told: str, page: object) -> str:
     if "\n" in told:
         raise InvalidValueError(f"{page}: {begin} must stand on a line of its own for {told!r}")
     return f"{before}{told}{after}"
+
+
+def check_page(page: Path, name: str) -> None:
+    """``fill_page`` will find its place: ``MissingPathError``, ``InvalidValueError`` otherwise."""
+    if not page.is_file():
+        raise MissingPathError(page, f"no such file: it must have the place <!-- {name} -->")
+    _marks(page.read_text(encoding="utf-8"), name, page)
 
 
 def fill_page(page: Path, name: str, told: str, most: int = MOST_CELLS) -> None:

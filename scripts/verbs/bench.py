@@ -13,6 +13,8 @@ from scripts.spec import option, spec
 from slam.errors import InvalidValueError
 from slam.files import write_text
 
+PLACE = "speed"  # of a page
+
 
 @spec
 class Bench:
@@ -28,7 +30,7 @@ class Bench:
         "Simulated seconds for each measurement, s.", 20, span=(1, 3600), unit="s"
     )
     out: Path | None = option(
-        "Also write the figures to this JSON file.", None, "--json", writes=True
+        "Also write the figures to this JSON file.", None, "--json", writes="file"
     )
     against: bool = option("Only ratios to others that are installed, in turn.", False)
     page: Path | None = option(
@@ -38,6 +40,10 @@ class Bench:
     def __call__(self) -> None:
         if self.page is not None and not self.against:
             raise InvalidValueError("--page needs --against: its table is of ratios to others")
+        if self.page is not None:
+            from scripts.marks import check_page
+
+            check_page(self.page, PLACE)
         from scripts.machine import machine, versions
 
         rows = _against(self.seconds, self.page) if self.against else _measured(self.seconds)
@@ -82,5 +88,5 @@ def _against(seconds: float, page: Path | None) -> list[dict[str, Any]]:
     told = against.table(rows, machine())
     console.print(told, markup=False, soft_wrap=True)
     if page is not None:
-        marks.fill_page(page, "speed", told)
+        marks.fill_page(page, PLACE, told)
     return rows

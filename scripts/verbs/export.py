@@ -27,7 +27,7 @@ class Export:
     to: str = option("tum, carmen, npz or smfeval.", REQUIRED, choices=tuple(SUFFIXES))
     out: Path | None = option(
         "File to write; default beside the log or dataset. tum: NAME_odometry.tum, ...",
-        writes=True,
+        writes="file",
     )
     slam: str = option("With --to smfeval: whose poses.", SLAM, complete=SLAMS)
 
@@ -35,8 +35,6 @@ class Export:
         if self.slam != SLAM and self.to != "smfeval":
             raise InvalidValueError(f"--slam is for --to smfeval, got --to {self.to}")
         check([self.slam])
-        if self.out is not None and self.out.is_dir():
-            raise InvalidValueError(f"--out must be a file, got the folder {self.out}")
         from scripts import exports
         from sim.recording.verify import check_bag
         from slam.logs import open_log, read_bag

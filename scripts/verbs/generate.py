@@ -9,8 +9,9 @@ from scenes import registry
 from scripts import options
 from scripts.console import console
 from scripts.names import check
-from scripts.spec import REQUIRED, SCENES, argument, option, part, spec
+from scripts.spec import REQUIRED, SCENES, argument, command_line, option, part, spec
 from slam.errors import InvalidValueError
+from slam.names import is_code
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -96,7 +97,9 @@ class Generate:
         plan, out = self.plan(), self.out
         from scripts import pace
         from scripts.dataset import carry_out
+        from sim.recording.dataset import refuse_others
 
+        refuse_others(out, plan)
         there = set(os.listdir(out)) if out.is_dir() else set()
         missing = [job for job in plan.jobs() if not there.issuperset(plan.folders(job))]
         works = [pace.Work(f"generate {job.scene}", job.seconds) for job in missing]
@@ -113,7 +116,7 @@ class Generate:
 
 def _page(plan: "Plan", out: Path, table: "Table") -> None:
     """What was made, a plan of the first episode at its start, and what it is good for."""
-    from scripts.pages.page import Page, Part, command, inline, publish
+    from scripts.pages.page import Page, Part, inline, publish
     from sim.simulation import Simulation
     from sim.view.mapview import MapView
 
@@ -133,9 +136,13 @@ def _page(plan: "Plan", out: Path, table: "Table") -> None:
             Part(title="Episode by episode", table=table),
         ],
         next={
-            "In this folder: is every byte still there?": command("verify", "."),
-            "A SLAM on the first of them:": command("run", "shunting", "--log", names[0]),
-            "The first of them as a film:": command("render", names[0]),
+            "Is every byte still there?": command_line("verify", folder=out),
+            "A SLAM on the first of them:": command_line(
+                "run", slam="shunting", log=out / names[0]
+            ),
+            "The first of them as a film:": command_line(
+                "render", folder=out / names[0], trust=is_code(first.scene)
+            ),
         },
         settings=about,
     )

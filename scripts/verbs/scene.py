@@ -133,7 +133,7 @@ class Show:
     which: str = WHICH()
     out: Path | None = OUT()
     seed: int = options.SEED(0)
-    width: int = option("", 1600)
+    width: int = option("Of the picture, px.", 1600, span=(32, 8192))
 
     def __call__(self) -> None:
         check_names([], self.which)
