@@ -125,6 +125,8 @@ def _page(plan: "Plan", out: Path, table: "Table") -> None:
     room.sense()
     start = inline(MapView(room.world.scene, 1080, 720).draw(room.world.mover_poses(), room.frame))
     about = {key: value for key, value in first.words().items() if value not in (None, {})}
+    here = Path("FOLDER")  # a dataset has the same bytes wherever it lies
+    one = here / names[0]
     page = Page(
         title=f"Episodes of {', '.join(plan.scenes or (first.scene,))}",
         said=[
@@ -136,12 +138,12 @@ def _page(plan: "Plan", out: Path, table: "Table") -> None:
             Part(title="Episode by episode", table=table),
         ],
         next={
-            "Is every byte still there?": command_line("verify", folder=out),
-            "A SLAM on the first of them:": command_line(
-                "run", slam="shunting", log=out / names[0]
+            "Is every byte still there? FOLDER is that of this page:": command_line(
+                "verify", folder=here
             ),
+            "A SLAM on the first of them:": command_line("run", slam="shunting", log=one),
             "The first of them as a film:": command_line(
-                "render", folder=out / names[0], trust=is_code(first.scene)
+                "render", folder=one, trust=is_code(first.scene)
             ),
         },
         settings=about,

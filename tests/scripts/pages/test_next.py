@@ -84,7 +84,7 @@ def test_what_a_page_says_to_type_works(here: Path, page: str, monkeypatch: pyte
             read(line)
     for line in {line.split()[1]: line for line in lines}.values():  # one of each verb
         verb, *words = shlex.split(line)[1:]
-        folder = str(Path(page).parent) if verb == "blame" else "again"
+        folder = "again" if verb in ("compare", "benchmark") else str(Path(page).parent)
         words = [FOR.get(word, word.replace("FOLDER", folder)) for word in words]
         if verb == "report" and not Path(words[0]).exists():
             continue  # of the comparison that the command before it makes
