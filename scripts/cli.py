@@ -4,14 +4,14 @@
 import logging
 import os
 import sys
-from importlib import import_module, metadata
+from importlib import metadata
 
 import typer
 
 from scripts import interrupt
 from scripts.console import COMPILER, LogLines, console, fail, note
 from scripts.option_names import Verb
-from scripts.spec import command, option, spec
+from scripts.spec import command, option, spec, spec_of
 from scripts.verbs.scene import scene
 from slam.errors import InvalidValueError, MissingPathError, MobiliaError, UnknownNameError
 from slam.names import load, look_in
@@ -30,16 +30,13 @@ app = typer.Typer(
     pretty_exceptions_enable=False,
     context_settings={"help_option_names": ["-h", "--help"]},
 )
-# Each is ``Name`` in ``scripts.verbs.name``; ``list`` would hide the built-in type.
 VERBS = (
     "demo", "run", "render", "generate", "verify", "export", "list", "config", "bench", "doctor",
     "sensor-card", "reproduce", "compare", "benchmark", "drive", "blame", "live", "report",
     "lifelong", "twin", "score",
 )  # fmt: skip
 for _name in VERBS:
-    _own = {"list": "listing"}.get(_name, _name).replace("-", "_")
-    _spec = getattr(import_module(f"scripts.verbs.{_own}"), _own.title().replace("_", ""))
-    app.command(_name, cls=Verb)(command(_spec))
+    app.command(_name, cls=Verb)(command(spec_of(_name)))
 
 app.add_typer(scene, name="scene")
 

@@ -12,7 +12,7 @@ from typing import Any, Generic, TypeVar
 
 from scripts.jobs import Job, run_jobs, try_names
 from scripts.machine import machine
-from scripts.output import result_folder
+from scripts.output import refuse_others, result_folder
 
 Files = Mapping[str, Path]
 """The file of each job, by the name of the job."""
@@ -55,13 +55,19 @@ class Study(Generic[R]):
     write: Callable[[Path, Files], R]
 
 
+def refuse(study: Study[R], out: Path) -> None:
+    """What is wrong with its names, or with the folder, is told before anything starts."""
+    try_names(study.slams, study.scenes)
+    refuse_others(out, study.command)
+
+
 def carry_out(study: Study[R], out: Path, *, jobs: int = 1, cluster: str | None = None) -> R:
     """Make what is missing in ``out``, then all that is told of it, whole or not at all.
 
     jobs     processes of this machine
     cluster  or a Dask scheduler, whose workers see ``out``
     """
-    try_names(study.slams, study.scenes)
+    refuse(study, out)
     out = out.absolute()
     settings = {**study.settings, "machine": machine()}
     with result_folder(out, study.command, settings) as written:

@@ -13,7 +13,7 @@ import re
 from collections.abc import Iterable, Sequence
 from pathlib import Path
 
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, MissingPathError
 from slam.files import write_text
 
 MOST_CELLS = 40  # of a table on a page
@@ -36,6 +36,13 @@ def filled(text: str, name: str, told: str, page: object) -> str:
     """
     start, end = _marks(text, name, page)
     return f"{text[: start + len(f'<!-- {name} -->')]}\n\n{told}\n\n{text[end:]}"
+
+
+def check_page(page: Path, name: str) -> None:
+    """``fill_page`` will find its place: ``MissingPathError``, ``InvalidValueError`` otherwise."""
+    if not page.is_file():
+        raise MissingPathError(page, f"no such file: it must have the place <!-- {name} -->")
+    _marks(page.read_text(encoding="utf-8"), name, page)
 
 
 def fill_page(page: Path, name: str, told: str, most: int = MOST_CELLS) -> None:

@@ -4,21 +4,25 @@
 import os
 import re
 from collections.abc import Mapping, Sequence
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
+from typer import BadParameter
 from typer.core import TyperCommand
 
 from scripts.spec import Option
 from slam import inputs
 from slam.errors import InvalidValueError
+from slam.files import refuse_unwritable
 
+UsageError: Any = BadParameter.__base__  # which typer does not name
 WORDS = "mobilia.words"  # of the command line, in a context
 # Whose fields are filled from options of their own name, where the options do not say otherwise.
 _FILLED = ("Recipe", "Plan", "LoopConfig", "Limits", "Rule", "Question", "Pace", "Dynamism",
            "Seeds", "Simulation", "World", "FromMap")  # fmt: skip
 _FIELD = re.compile(rf"\b({'|'.join(_FILLED)})\.([a-z_]+)\b")
-_FIRST = re.compile(r"^([a-z_]+)(?= must )")
+_FIRST = re.compile(r"^([a-z_]+)(?=(?:\[\d+\]\.\w+)? must )")
 
 
 class Verb(TyperCommand):
@@ -41,6 +45,26 @@ class Verb(TyperCommand):
         }
         ctx.meta[WORDS] = args
         return super().parse_args(ctx, repeated(args, lists))
+
+    def make_context(self, info_name: Any, args: list[str], parent: Any = None, **more: Any) -> Any:
+        """As typer's; ``InvalidValueError`` in one line for what cannot be read."""
+        words = [part for word in args for part in word.split("=", 1)]
+        try:
+            return super().make_context(info_name, args, parent, **more)
+        except UsageError as error:
+            group = f"{parent.info_name} " if parent and parent.parent else ""
+            verb = f"mobilia {group}{info_name}"
+            raise InvalidValueError(self._unread(error, words, verb)) from error
+
+    def _unread(self, error: Any, words: Sequence[str], verb: str) -> str:
+        """What is wrong: the option, the value and what was expected."""
+        typed: Sequence[str] = getattr(getattr(error, "param", None), "opts", ())
+        kind = next((str(one.kind) for one in self.options if one.word in typed), "")
+        value = next((after for word, after in pairwise(words) if word in typed), None)
+        if value is not None and ("int" in kind or "float" in kind):
+            number = "a whole number" if "int" in kind else "a number"
+            return f"{typed[0]} must be {number}, got {value!r:.80}"
+        return f"{error.format_message().rstrip('.')}. What there is: {verb} --help"
 
     def shell_complete(self, ctx: Any, incomplete: str) -> Any:
         """The second and later words of a list are completed as its first is."""
@@ -78,6 +102,9 @@ class Verb(TyperCommand):
                     continue
                 if option.writes:
                     written.append(Path(word))
+                    refuse_unwritable(Path(word))
+                    if option.writes == "file" and os.path.isdir(word):
+                        raise InvalidValueError(f"{option.word} must be a file, got folder {word}")
                 elif not (option.complete and os.path.isdir(word)):
                     inputs.note(Path(word))
         inputs.refuse(*written)

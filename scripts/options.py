@@ -15,7 +15,7 @@ from typing import Any
 from scenes import is_file
 from scripts.console import note
 from scripts.spec import SCANNERS, SLAMS, option, part, spec
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, meant
 from slam.names import NameFromFile, is_code, refuse_code
 from slam.set_numbers import with_set
 from slam.variants import COMMANDS, ORACLE, oracle_named
@@ -187,8 +187,19 @@ def place_of(text: str, name: str) -> tuple[float, float, float]:
     try:
         x, y, yaw_deg = (float(word) for word in text.replace(",", " ").split())
     except ValueError:
-        raise InvalidValueError(f"{name} must be x,y,yaw_deg in m, m, deg, got {text!r}") from None
+        raise InvalidValueError(
+            f"{name} must be x,y,yaw_deg in m, m, deg, got {text!r}{_scanner_meant(text)}"
+        ) from None
     return x, y, yaw_deg
+
+
+def _scanner_meant(text: str) -> str:
+    """Of a word where a place is wanted: a scanner is asked for by another option."""
+    if not text[:1].isalpha():
+        return ""
+    from sim.sensors.lidar.registry import names
+
+    return f"; --scanner says which scanner.{meant(text, names())} Known: {', '.join(names())}"
 
 
 def also_at(texts: list[str] | None) -> dict[str, Any]:

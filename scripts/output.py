@@ -55,16 +55,23 @@ def locked_folder(out: Path, command: str) -> Iterator[None]:
     made: list[Path] = []
     try:
         with told(out):
+            refuse_others(out, command)
             made = files.make_folder(out)
-            names = (f.name for f in out.iterdir())
-            if any(name not in locks.NAMES and not files.is_part(name) for name in names):
-                words = words_of_ours(out)
-                if words["command"] != command:
-                    raise OutputError(another(out, words))
             with locks.locked(out):
                 yield
     finally:
         files.remove_empty(made)
+
+
+def refuse_others(out: Path, command: str) -> None:
+    """``OutputError`` for a folder that holds files without a recipe of ``command``."""
+    if out.exists() and not out.is_dir():
+        raise OutputError(f"{out} is a file; --out needs a folder")
+    names = (f.name for f in out.iterdir()) if out.is_dir() else ()
+    if any(name not in locks.NAMES and not files.is_part(name) for name in names):
+        words = words_of_ours(out)
+        if words["command"] != command:
+            raise OutputError(another(out, words))
 
 
 @contextmanager

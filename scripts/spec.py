@@ -8,6 +8,7 @@ completion, the paths that are written, and the errors that name an option
 """
 
 import inspect
+import shlex
 from collections.abc import Callable, Mapping
 from dataclasses import MISSING, Field, dataclass, field, fields, replace
 from functools import cache, partial
@@ -51,7 +52,7 @@ class Option:
     words     how it is typed, where that is not --name
     complete  ``SCENES`` and its like
     fills     fields of plans and configs that are called otherwise, such as ``Plan.slams``
-    writes    whether it is a path that is written to
+    writes    whether it is a path that is written to; "file": and no folder
     choices   all that it may be, where these are few
     span      lowest and highest number, ``unit`` of them
     suffix    of the name of a file
@@ -64,17 +65,22 @@ class Option:
     words: tuple[str, ...] = ()
     complete: Callable[[str], list[str]] | None = None
     fills: tuple[str, ...] = ()
-    writes: bool = False
+    writes: bool | str = False
     choices: tuple[str, ...] = ()
     span: tuple[float, float] | None = None
     unit: str = ""
     suffix: str = ""
 
+    @property
+    def word(self) -> str:
+        """How it is typed, and called in errors."""
+        return self.words[0].partition("/")[0] if self.words else f"--{self.name.replace('_', '-')}"
+
     def parameter(self) -> inspect.Parameter:
         """Of the function that typer reads."""
         words = self.words
         if self.kind is bool and self.default is False and not words:
-            words = (f"--{self.name.replace('_', '-')}",)  # without its --no-...
+            words = (self.word,)  # without its --no-...
         default = ... if self.default is MISSING else self.default
         return inspect.Parameter(
             self.name, inspect.Parameter.POSITIONAL_OR_KEYWORD, annotation=self.kind,
@@ -96,8 +102,7 @@ class Option:
         if self.suffix and value.suffix.lower() != self.suffix:
             wanted, value = f"be a file that ends in {self.suffix}", f"'{value}'"
         if wanted:
-            name = self.words[0] if self.words else f"--{self.name}"
-            raise InvalidValueError(f"{name} must {wanted}, got {value}")
+            raise InvalidValueError(f"{self.word} must {wanted}, got {value}")
 
 
 def option(
@@ -186,3 +191,36 @@ def command(kind: type) -> Callable[..., None]:
     call.__doc__ = kind.__doc__
     vars(call).update(__signature__=signature, options=options)
     return call
+
+
+def spec_of(verb: str) -> type:
+    """``Name`` in ``scripts.verbs.name``; ``list`` would hide the built-in type."""
+    own = {"list": "listing"}.get(verb, verb).replace("-", "_")
+    found: type = getattr(import_module(f"scripts.verbs.{own}"), own.title().replace("_", ""))
+    return found
+
+
+def command_line(verb: str, **given: Any) -> str:
+    """What to type for a verb with these of its options, to be copied; None and False are not
+    given.
+
+    Raises ``KeyError`` for an option that it does not have, ``InvalidValueError`` as typing it.
+    """
+    options = {one.name: one for one in options_of(spec_of(verb))}
+    words, after = ["mobilia", verb], list[str]()
+    for name, value in given.items():
+        one = options[name]
+        one.check(value)
+        if value is None or value is False:
+            continue
+        several = value if isinstance(value, list | tuple) else [value]
+        texts = [] if value is True else [_text(each) for each in several]
+        if one.typed.func is typer.Argument:  # type: ignore[attr-defined]
+            words += texts
+        else:
+            after += [one.word, *texts]
+    return shlex.join([*words, *after])
+
+
+def _text(value: Any) -> str:
+    return f"{value:.12g}" if isinstance(value, float) else str(value)

@@ -44,7 +44,7 @@ def whole_folder(
     try:
         with told(said, temporary):
             made = files.make_folder(path.parent)
-            listed = _replaceable(path, overwrite, command, settings or {})
+            listed = replaceable(path, overwrite, command, settings or {})
             files.clear_parts(path)
             temporary.mkdir()
             with files.locked(temporary):
@@ -71,10 +71,11 @@ def check_place(*places: Path, overwrite: bool) -> None:
         raise InvalidValueError(f"there already: {', '.join(there)}: --overwrite replaces them")
 
 
-def _replaceable(
-    path: Path, overwrite: bool, command: str, settings: Mapping[str, Any]
-) -> Set[str]:
-    """The files of an earlier result at ``path``, by its SHA256SUMS; itself among them."""
+def replaceable(path: Path, overwrite: bool, command: str, settings: Mapping[str, Any]) -> Set[str]:
+    """The files of an earlier result at ``path``, by its SHA256SUMS; itself among them.
+
+    Raises as ``whole_folder``, which asks it, too: a verb may before it says what is ahead.
+    """
     if not path.exists():
         return frozenset()
     if not path.is_dir():

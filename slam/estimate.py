@@ -35,6 +35,14 @@ class Estimate:
     diagnostics: Mapping[str, Any] = field(default_factory=dict)
 
     def __post_init__(self) -> None:
+        if not isinstance(self.converged, int | np.bool_):
+            raise InvalidValueError(
+                f"Estimate.converged must be True or False, got {self.converged!r:.80}"
+            )
+        if not isinstance(self.diagnostics, Mapping):
+            raise InvalidValueError(
+                f"Estimate.diagnostics must be a mapping, got {self.diagnostics!r:.80}"
+            )
         set_fields(
             self,
             T_map_robot=pose("Estimate", "T_map_robot", self.T_map_robot),

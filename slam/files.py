@@ -82,6 +82,16 @@ def write_text(path: Path, text: str) -> None:
         raise OutputError(f"cannot write {path}: it would hold a name that is no UTF-8") from error
 
 
+def refuse_unwritable(path: Path) -> None:
+    """``OutputError`` where nothing can be written at ``path``, before work is done for it."""
+    there = next(p for p in (path.absolute(), *path.absolute().parents) if os.path.lexists(p))
+    if there != path.absolute() and not there.is_dir():
+        raise OutputError(f"cannot write {path}: {there} is no folder")
+    folder = there if there.is_dir() else there.parent
+    if not os.access(folder, os.W_OK | os.X_OK):
+        raise OutputError(f"cannot write {path}: {os.strerror(errno.EACCES)} in {folder}")
+
+
 def part_of(path: Path) -> Path:
     """The temporary name of a file."""
     return path.with_name(f".{path.stem}.{os.getpid()}{PART}{path.suffix}")

@@ -12,6 +12,7 @@ are optional.
 Who wants one of these asks whether it is there (``slam.replay.Track``), never for a class.
 """
 
+import inspect
 import os
 import sysconfig
 import traceback
@@ -25,7 +26,7 @@ from slam.frames import Float, Frame
 from slam.trajectory import Trajectory
 
 _FOLDERS = (*map(sysconfig.get_path, ("stdlib", "purelib", "platlib")), str(Path(__file__).parent))
-_LIBRARIES = ("<frozen ", *(folder + os.sep for folder in _FOLDERS))
+_LIBRARIES = ("<frozen ", "<string>", *(folder + os.sep for folder in _FOLDERS))
 
 
 @runtime_checkable
@@ -124,5 +125,16 @@ def told(error: BaseException) -> str:
     what = f"{type(error).__name__}: {words}" if words else type(error).__name__
     trace = traceback.extract_tb(error.__traceback__)
     theirs = [at for at in trace if not at.filename.startswith(_LIBRARIES)] or trace
-    where = f" ({Path(theirs[-1].filename).name}:{theirs[-1].lineno})" if theirs else ""
-    return what + where
+    return what + (_place(theirs[-1].filename, theirs[-1].lineno) if theirs else "")
+
+
+def place_of(method: object) -> str:
+    """`` (my_slam.py:12)``: where somebody else's method begins; "" for one of ours."""
+    code = getattr(inspect.unwrap(method), "__code__", None) if callable(method) else None
+    if code is None or code.co_filename.startswith(_LIBRARIES):
+        return ""
+    return _place(code.co_filename, code.co_firstlineno)
+
+
+def _place(file: str, line: int | None) -> str:
+    return f" ({Path(file).name}:{line})"

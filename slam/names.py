@@ -13,8 +13,9 @@ import importlib
 import os
 import re
 import sys
-from collections.abc import Iterable
+from collections.abc import Iterable, Set
 from importlib.util import find_spec
+from itertools import product
 from pathlib import Path
 
 from slam.errors import InvalidValueError, MobiliaError, UnknownNameError, UntrustedNameError
@@ -136,3 +137,37 @@ def first_line(entry: str) -> str:
         if isinstance(node, ast.ClassDef | ast.FunctionDef) and node.name == name:
             return (ast.get_docstring(node) or "").partition("\n")[0]
     return ""
+
+
+METHODS = {"update", "locate"}  # of a SLAM, and of a guest
+_KINDS = ("Slam", "Guest")  # ends of the names of classes to inherit from
+
+
+def code_meant(name: str) -> list[str]:
+    """For ``my_slam``, ``my_slam.py`` or ``my_slam.MySlam``: ``my_slam:MySlam`` for each class of a
+    file of that name, where modules are found (``look_in``), that looks like a SLAM.
+
+    The file is read and not run.
+    """
+    module = name.partition(":")[0].removeprefix("./").removesuffix(".py")
+    for folder, stem in product(_wanted, (module, module.rpartition(".")[0])):
+        path = Path(folder, f"{stem}.py")
+        if stem.isidentifier() and path.is_file():
+            return [f"{stem}:{one}" for one in _classes_with(METHODS, path)]
+    return []
+
+
+def _classes_with(methods: Set[str], path: Path) -> list[str]:
+    """Names of the classes in a file that define one of these or inherit it, by their names; none
+    of a file that is no Python."""
+    found: list[str] = []
+    try:
+        tree = ast.parse(path.read_bytes())
+    except (OSError, ValueError, SyntaxError, RecursionError, MemoryError):
+        return found
+    for one in (node for node in tree.body if isinstance(node, ast.ClassDef)):
+        own = {of.name for of in one.body if isinstance(of, ast.FunctionDef)}
+        above = [ast.unparse(base) for base in one.bases]
+        if own & methods or any(base in found or base.endswith(_KINDS) for base in above):
+            found.append(one.name)
+    return found

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """``--set PATH=VALUE``: numbers put into the names of the SLAMs that run."""
 
+import re
 from collections.abc import Mapping, Sequence
 from typing import Any
 
@@ -45,7 +46,11 @@ def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     variants = tuple(_with(name, changes[name]) for name in names)
     for name, variant in zip(names, variants, strict=True):
         if changes[name] and ":" not in parsed(name)[0]:
-            config_of(variant)
+            try:
+                config_of(variant)
+            except InvalidValueError as error:
+                said = re.sub(r"^\w+\.", "", str(error))  # without the class of the field
+                raise InvalidValueError(f"--set: {said}") from error
     return variants
 
 

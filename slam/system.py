@@ -10,7 +10,7 @@
 """
 
 import inspect
-from collections.abc import Callable, Mapping
+from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 from importlib import import_module
 from typing import Any, TypeVar
@@ -28,7 +28,7 @@ from slam.interface import (
     refuse_at_the_end,
     told,
 )
-from slam.names import first_line, join_folders, refuse_code
+from slam.names import code_meant, first_line, join_folders, refuse_code
 from slam.oracle import Oracle
 from slam.settings import Settings
 from slam.variants import MAP_ORACLE, inside, oracle_of, parsed
@@ -128,9 +128,18 @@ def check_name(name: str) -> None:
     if ":" in base or own or base in _registry:
         return
     raise UnknownNameError(
-        f"no SLAM is called '{base}'.{meant(base, names())} Known: {', '.join(names())}, "
+        f"no SLAM is called '{base}'.{_meant(base, names())} Known: {', '.join(names())}, "
         "or module:Class, or pipe:COMMAND, or ros2[:COMMAND], or oracle(SLAM)."
     )
+
+
+MOST_MEANT = 3  # classes that a hint names
+
+
+def _meant(name: str, known: Sequence[str]) -> str:
+    """A hint of classes in a file here of that name, else of the nearest of those known."""
+    here = [f"'{code}'" for code in code_meant(name)[:MOST_MEANT]]
+    return f" Did you mean {' or '.join(here)}?" if here else meant(name, known)
 
 
 def config_of(name: str) -> tuple[Settings, Settings] | None:
@@ -220,11 +229,15 @@ def _load(entry: str) -> Factory:
     try:
         module = import_module(module_name)
     except (ImportError, TypeError, ValueError) as error:  # the last two: no proper module name
-        raise UnknownNameError(f"'{entry}': cannot import '{module_name}' ({error})") from error
+        raise UnknownNameError(
+            f"'{entry}': cannot import '{module_name}' ({error}).{_meant(entry, [])}"
+        ) from error
     except Exception as error:
         raise SlamFailedError(f"'{entry}': '{module_name}' fails: {told(error)}") from error
     try:
         factory: Factory = getattr(module, attribute)
     except AttributeError:
-        raise UnknownNameError(f"'{entry}': module '{module_name}' has no '{attribute}'") from None
+        raise UnknownNameError(
+            f"'{entry}': module '{module_name}' has no '{attribute}'.{_meant(entry, [])}"
+        ) from None
     return factory

@@ -10,8 +10,10 @@ from scripts.comparison.plan import Plan
 from scripts.names import RUNS, is_run
 from scripts.options import admitted
 from scripts.output import RECIPE, check_whole, read_recipe_words, scenes_of, slams_of
+from scripts.spec import command_line
 from sim.core.versions import check_world, world_of
 from sim.recording.recipe import Made, Recipe, read_recipe
+from sim.recording.sums import check_vouched
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
 
 OF_ONE = ("run", "demo", None)  # commands that leave one run
@@ -54,6 +56,11 @@ def again(path: Path, trust: bool = False) -> Again:
     if is_run(path):
         return run_of(path, trust)
     recipe = path / RECIPE if path.is_dir() else path
+    check_vouched(recipe)  # one that is listed is lost
+    if path.is_dir() and not recipe.exists():
+        raise LogFormatError(path, "holds no run or episode" + _episodes_in(path))
+    if path.is_file() and path.suffix != ".json":
+        raise LogFormatError(path, "is no folder of a run or an episode, which have a recipe.json")
     words = read_recipe_words(recipe)
     if "recipe" in words:
         made = read_recipe(recipe)
@@ -66,9 +73,9 @@ def again(path: Path, trust: bool = False) -> Again:
         raise LogFormatError(recipe, "no recipe of a run: it has no settings")
     slams = tuple(slams_of(recipe, settings))
     if "log" in settings:
-        slam = "".join([f" with --slam {name}" for name in slams if name != "odometry"][:1])
-        film = f"for a film, render '{settings['log']}' itself{slam}"
-        why = f"this run was on a log, which is not kept in it: {film}"
+        slam = next((name for name in slams if name != "odometry"), None)
+        film = command_line("render", folder=str(settings["log"]), slam=slam)
+        why = f"this run was on a log, which is not kept in it: the film of the log is {film}"
         raise LogFormatError(recipe.parent, why)
     if "scene" not in settings or "seconds" not in settings:
         raise LogFormatError(recipe.parent, why_no_run(recipe.parent, command))
@@ -77,6 +84,12 @@ def again(path: Path, trust: bool = False) -> Again:
     world = {key: value for key, value in settings.items() if key not in OF_THE_RUN}
     world["scene"] = admitted(scenes_of(recipe, {"scene": settings["scene"]})[0], "scene", trust)
     return Again(settings=world, seconds=settings["seconds"], slams=slams)
+
+
+def _episodes_in(folder: Path) -> str:
+    """What to name instead of a dataset."""
+    first = min((one.parent for one in folder.glob(f"*/{RECIPE}")), default=None)
+    return "" if first is None else f": name one of those in it, as {first}"
 
 
 def _of(recipe: Recipe, trust: bool, **more: Any) -> Again:

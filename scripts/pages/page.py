@@ -7,7 +7,6 @@ and macros; the report of a comparison is another page of it.
 
 import base64
 import re
-import shlex
 import tomllib
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, field
@@ -47,7 +46,8 @@ class Part:
 
 @dataclass(frozen=True, kw_only=True)
 class Page:
-    """A page of a folder; ``said`` in backticks is a name, ``next`` has commands by their purpose.
+    """A page of a folder; ``said`` in backticks is a name, ``next`` has commands by their purpose
+    (``scripts.spec.command_line``).
 
     settings  how it was made, at the end of the page
     """
@@ -87,11 +87,6 @@ def tell(folder: Path, page: Page) -> None:
     for line in page.said:
         fact(line)
     say(f"Open [bold]{escape(str(folder / INDEX))}[/bold] first.", highlight=False)
-
-
-def command(*words: object) -> str:
-    """A command line of ``mobilia``, to be copied."""
-    return shlex.join(["mobilia", *map(str, words)])
 
 
 @cache

@@ -216,6 +216,8 @@ def _concluded(of: Standing) -> str:
         begins = f"at {first.at:g}"
         if of.axis == PEOPLE:
             begins = f"from {of.place([first.at])} on in {of.scene}"
+        if before.subject.lost:
+            return f"half of the runs or more are lost {begins}, {sure}"
         return f"it holds at {before.at:g} and is lost {begins}, {sure}"
     return sure
 

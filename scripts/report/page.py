@@ -2,13 +2,13 @@
 """The page: what each part of the template is given, and the one file that comes out."""
 
 import math
-import shlex
 from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
 from scripts.closed_loop.tables import Driven
 from scripts.comparison.plan import Run
+from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import LATER, NOT_ASKED, settings
 from scripts.figures import color_of, glyph
 from scripts.metrics.table import CURVES, EXPLAINED, METRICS, PAIRED, Section, of_section
@@ -16,8 +16,10 @@ from scripts.pages.page import template
 from scripts.pages.table import Table
 from scripts.report import answer, curves, pictures, score_tables, tables
 from scripts.report.study import LEAST_RUNS, Study
+from scripts.spec import command_line
 from sim.recording.sums import add_to_sums
 from slam.files import write_text
+from slam.names import is_code
 
 REPORT = "report.html"
 ANSWERED = ("finished", "lost")  # how a run ends in which nothing failed
@@ -91,8 +93,8 @@ def _standings(study: Study) -> list[answer.Standing]:
 def blame_command(study: Study, row: dict[str, Any], folder: str = "FOLDER") -> str:
     """What to type to learn which mover misled the SLAM of a row; ``folder``: the comparison's."""
     run = Run(scene=row["scene"], dynamism=row["dynamism"], seed=int(row["seed"]), axis=study.axis)
-    path = f"{folder}/runs/{run.name}.npz"
-    return shlex.join(["mobilia", "blame", path, "--slam", str(row["slam"])])
+    path, trust = f"{folder}/runs/{run.name}.npz", is_code(run.scene)
+    return command_line("blame", folder=path, slam=row["slam"], trust=trust)
 
 
 def _levels(study: Study, section: Section) -> list[tuple[str, list[Table]]]:
@@ -147,7 +149,7 @@ def _recipe(study: Study) -> dict[str, Any]:
     told = study.compared.settings
     known = {**settings(study.axis), **LATER}
     return {
-        "command": _command(told),
+        "command": _command(study),
         "versions": recipe["versions"],
         "machine": told["machine"],
         "rest": {
@@ -158,21 +160,22 @@ def _recipe(study: Study) -> dict[str, Any]:
     }
 
 
-def _command(told: dict[str, Any]) -> str:
-    """The command line that asks for this comparison."""
-    seeds, knobs = told["seeds"], [name for name in LATER if name not in NOT_ASKED]
-    given = {
-        "slam": told["slams"],
-        "scene": told["scenes"],
-        told.get("axis", "dynamism"): [f"{level:g}" for level in told["levels"]],
-        **{k.replace("_", "-"): [told[k]] for k in knobs if told.get(k) is not None},
-        "seeds": [len(seeds)],
-        "first-seed": seeds[:1],
-        "seconds": [f"{told['seconds']:g}"],
-        "every": [told["every"]],
-        "scanner": [told["scanner"]],
-        "scan-limit": [f"{told['scan_limit_s']:g}"],
-        "out": ["FOLDER"],
-    }
-    options = (word for name, values in given.items() for word in (f"--{name}", *map(str, values)))
-    return shlex.join(["mobilia", "compare", *options])
+def _command(study: Study) -> str:
+    """The command line that asks for this comparison, or for this track of a benchmark."""
+    told = study.compared.settings
+    seeds, slams = told["seeds"], told["slams"]
+    if study.axis == LEVEL:
+        contestants = [slam for slam in slams if not answer.is_control(slam)]
+        return command_line(
+            "benchmark", tracks=study.compared.folder.resolve().name, slam=contestants or slams,
+            quick=len(told["levels"]) == 3, train=seeds[0] == 0, seeds=len(seeds),
+            seconds=told["seconds"], out="FOLDER",
+        )  # fmt: skip
+    levels = {told.get("axis", "dynamism"): told["levels"]}
+    knobs = {name: told.get(name) for name in LATER if name not in NOT_ASKED}
+    named = ("seconds", "every", "scanner")
+    return command_line(
+        "compare", slam=slams, scene=told["scenes"], **{**knobs, **levels}, seeds=len(seeds),
+        first_seed=seeds[0], **{name: told[name] for name in named},
+        scan_limit=told["scan_limit_s"], out="FOLDER",
+    )  # fmt: skip

@@ -81,7 +81,9 @@ def understood(footage: Footage) -> str:
     parts += [beams, f"{count} scans at {rate:.3g} Hz", place]
     parts += [f"{one.extra.get('scan')}, {', '.join(_scanner(one))}" for one in metadata.others]
     if names := extra.get("ignored", {}).get(NAMES):
-        parts.append(f"{names} {NAMES} passed over")
+        parts.append(
+            f"{names} {NAMES if names > 1 else NAMES.replace('lines', 'line')} passed over"
+        )
     odometry = str(extra.get("odometry") or "none")
     parts.append(f"odometry: {odometry if metadata.odometry else 'none'}")
     named = {one.extra.get("scan") for one in metadata.others}

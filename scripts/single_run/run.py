@@ -14,11 +14,12 @@ from scripts.film.footage import of_log, of_scene
 from scripts.pace import Work, announce, timed
 from scripts.single_run.log_words import mount_of, tell, tell_distrust
 from scripts.single_run.session import Outputs, run_session
+from scripts.whole_folder import replaceable
 from slam import inputs
 from slam.days.history import History
 from slam.days.session import Session, keep, read_history
-from slam.errors import InvalidValueError
-from slam.frames import EPOCH, NS_PER_S, Stream
+from slam.errors import InvalidValueError, MissingPathError
+from slam.frames import EPOCH, NS_PER_S, Float, Stream
 from slam.logs.bag_topics import Asked
 from slam.system import create
 from slam.tracker.tracker import Tracker
@@ -40,6 +41,21 @@ class Maps:
     def __post_init__(self) -> None:
         if self.at is not None and not self.given:
             raise InvalidValueError("--at is about --map-in or --map-out")
+        if self.map_in is not None and not self.map_in.exists():
+            raise MissingPathError(self.map_in, "no such file")
+        self.at_s()
+
+    def at_s(self) -> float | None:
+        """``at`` as s since 1970; ``InvalidValueError`` for what is no time."""
+        if self.at is None:
+            return None
+        try:
+            at = datetime.fromisoformat(self.at)
+        except ValueError:
+            raise InvalidValueError(
+                f"--at must be a time such as 2026-05-04T09:00, got {self.at!r}"
+            ) from None
+        return at.replace(tzinfo=at.tzinfo or UTC).timestamp()
 
 
 def session_of(name: str, maps: Maps, stream: Stream) -> Session:
@@ -63,14 +79,8 @@ def session_of(name: str, maps: Maps, stream: Stream) -> Session:
 
 def _time_s(maps: Maps, stream: Stream, history: History | None) -> float:
     """As ``--at`` says, else as the log's clock does, else 0 for a first session."""
-    if maps.at is not None:
-        try:
-            at = datetime.fromisoformat(maps.at)
-        except ValueError:
-            raise InvalidValueError(
-                f"--at must be a time such as 2026-05-04T09:00, got {maps.at!r}"
-            ) from None
-        return at.replace(tzinfo=at.tzinfo or UTC).timestamp()
+    if (at_s := maps.at_s()) is not None:
+        return at_s
     epoch_ns = int(stream.metadata.extra.get(EPOCH, 0))
     if epoch_ns > 0:
         return epoch_ns / NS_PER_S
@@ -116,6 +126,13 @@ class Log:
     flip: bool = False
     odometry: str | None = None
 
+    def mounts(self) -> list[Float]:
+        """``laser`` as ``mount_of`` reads it."""
+        return [mount_of(text) for text in self.laser or ()]
+
+    def __post_init__(self) -> None:
+        self.mounts()  # complains
+
 
 def on_log(
     names: list[str],
@@ -132,7 +149,7 @@ def on_log(
         footage = of_log(
             path, strict=log.strict, text_format=log.text_format,
             asked=[Asked(scan, log.odometry) for scan in log.scan or (None,)],
-            mounts=[mount_of(text) for text in log.laser or ()], flip=log.flip,
+            mounts=log.mounts(), flip=log.flip,
         )  # fmt: skip
     found = tell(footage, strict=log.strict)
     show = footage.show(names)
@@ -173,12 +190,15 @@ def on_scene(
     """
     seconds, filmed = settings["seconds"], ", filmed" * outputs.film
     work = Work(f"run on a scene{filmed}", seconds * len(names))
-    announce(f"{seconds:g} s of {settings['scene']}{filmed}", [work])
-    if plan_only:
-        return
-    with timed(work), of_scene(settings, view="follow" if outputs.film else None) as footage:
+    view = "follow" if outputs.film and not plan_only else None
+    with of_scene(settings, view=view) as footage:
         show = footage.show(names)
+        recipe = {"slams": list(show.replay.tracks), **settings, **footage.made_with}
+        replaceable(outputs.folder, outputs.overwrite, outputs.command, recipe)
+        announce(f"{seconds:g} s of {settings['scene']}{filmed}", [work])
+        if plan_only:
+            return
         if outputs.film and footage.no_camera:
             note(f"the film has no 3D panel: {footage.no_camera}")
-        recipe = {"slams": list(show.replay.tracks), **settings, **footage.made_with}
-        run_session(footage.stream, show, replace(outputs, settings=recipe))
+        with timed(work):
+            run_session(footage.stream, show, replace(outputs, settings=recipe))

@@ -26,11 +26,12 @@ from scripts.film.show import Show
 from scripts.live.replay import Recorder
 from scripts.machine import machine
 from scripts.metrics.judged import in_first_frame
-from scripts.names import file_name
+from scripts.names import file_name, scene_name
 from scripts.output import write_recipe
 from scripts.pages import page as pages
-from scripts.pages.page import Page, Part, command
+from scripts.pages.page import Page, Part
 from scripts.single_run import score
+from scripts.spec import command_line
 from scripts.whole_folder import whole_folder
 from sim.view.draw import Picture
 from slam.errors import InvalidValueError
@@ -40,8 +41,10 @@ from slam.files import write_text
 from slam.frames import EPOCH, Stream
 from slam.frontend.seen_space import SeenSpace
 from slam.maps import write_map
+from slam.names import is_code
 from slam.rasters import joined, known
 from slam.replay import Replay, Track
+from slam.tracker.tracker import Tracker
 from slam.trajectory import Trajectory, write_tum
 
 MOST_PIXELS = 1 << 26  # of map.pgm: a square of 245 m at 3 cm, which a map_server holds as 67 MB
@@ -269,20 +272,30 @@ def _page(outputs: Outputs, show: Show, results: Mapping[str, Any], table: Table
         Part(title="Error over time", picture="errors.png"),
         Part(title="Numbers", table=table),
     ]
-    folder, settings = outputs.folder, outputs.settings
-    then = {"Go on in this map:": command(
-        "run", show.primary, "--log", "LOG", "--map-in", folder / "map.npz", "--map-out", "NEXT.npz"
-    )}  # fmt: skip
-    if "scene" in settings:
-        levels = ("--scene", settings["scene"], "--dynamism", "0:1:0.5", "--seeds", "6")
-        then = {
-            "What misled it, if anything did:": command("blame", folder),
-            "From how much motion on is it lost?": command(
-                "compare", "--slam", show.primary, *levels, "--out", "out/compare"
-            ),
-            "Drive and disturb it yourself:": command("live", "--scene", settings["scene"]),
-        }
+    settings = {key: value for key, value in outputs.settings.items() if key != "log_facts"}
     return Page(
-        title=show.title, said=score.said(results, show.primary), parts=parts, next=then,
-        settings={key: value for key, value in settings.items() if key != "log_facts"},
+        title=show.title, said=score.said(results, show.primary), parts=parts,
+        next=_next(outputs, show), settings=settings,
     )  # fmt: skip
+
+
+def _next(outputs: Outputs, show: Show) -> dict[str, str]:
+    """What to do with the run."""
+    folder, settings, slam = outputs.folder, outputs.settings, show.primary
+    if "scene" not in settings:
+        if not isinstance(show.track().system, Tracker):  # no other goes on in a map
+            return {}
+        maps = {"map_in": folder / "map.npz", "map_out": "NEXT.npz"}
+        return {"Go on in this map:": command_line("run", slam=slam, log="LOG", **maps)}
+    scene, scanner = settings["scene"], settings.get("laser", "full")
+    then = {}
+    if not settings.get("also_at"):
+        trust = is_code(slam) or is_code(scene)
+        blame = command_line("blame", folder=folder, trust=trust)
+        then["What misled it, if anything did:"] = blame
+    then["From how much motion on is it lost?"] = command_line(
+        "compare", slam=slam, scene=scene, dynamism="0:1:0.5", seeds=6,
+        scanner=None if scanner == "full" else scanner, out=f"out/compare-{scene_name(scene)}",
+    )  # fmt: skip
+    then["Drive and disturb it yourself:"] = command_line("live", scene=scene, slam=slam)
+    return then

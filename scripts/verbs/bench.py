@@ -30,7 +30,7 @@ class Bench:
         "Simulated seconds for each measurement, s.", 20, span=(1, 3600), unit="s"
     )
     out: Path | None = option(
-        "Also write the figures to this JSON file.", None, "--json", writes=True
+        "Also write the figures to this JSON file.", None, "--json", writes="file"
     )
     against: bool = option("Only ratios to others that are installed, in turn.", False)
     only: str | None = option(
@@ -48,6 +48,10 @@ class Bench:
     def __call__(self) -> None:
         if (self.page or self.only) is not None and not self.against:
             raise InvalidValueError("--page and --only need --against: they are of its table")
+        if self.page is not None:
+            from scripts.marks import check_page
+
+            check_page(self.page, self.only or "speed")
         from scripts.machine import machine, versions
 
         rows = self._against() if self.against else _measured(self.seconds)

@@ -12,12 +12,13 @@ from scripts import options
 from scripts.console import console, fact, note, say
 from scripts.names import check
 from scripts.options import named
-from scripts.spec import SLAMS, names_of, option, part, spec
+from scripts.spec import SLAMS, command_line, names_of, option, part, spec
 from slam.errors import MissingPathError
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
     from scripts.benchmark.board import Board
+    from scripts.pages.page import Part
 
 
 UNFAIR = "* does not count: no oracle holds there"
@@ -75,6 +76,8 @@ class Benchmark:
         from scripts.benchmark.make import QUICK_SEEDS, SEEDS, carry_out, plans_of, wanted_of
         from scripts.benchmark.tracks import chosen
         from scripts.comparison.plan import ahead
+        from scripts.jobs import try_names
+        from scripts.output import refuse_others
 
         workers.check_jobs(self.work.jobs)
         merge = self.merge or []
@@ -95,6 +98,8 @@ class Benchmark:
             train=self.train, seeds=usual if self.seeds is None else self.seeds,
             quick=self.quick, seconds=self.seconds, submit=self.submit, days=self.days,
         )  # fmt: skip
+        try_names(wanted.slams, ())
+        refuse_others(self.out, "benchmark")
         parts = [ahead(plan, self.out / name) for name, plan in plans_of(wanted, ship).items()]
         works = [job.work() for missing, _ in parts for job in missing]
         what = f"{len(works)} of {sum(count for _, count in parts)} jobs, tracks: {len(parts)}"
@@ -112,7 +117,7 @@ class Benchmark:
 
 def _tell(board: "Board", out: Path, spent_s: float) -> None:
     from scripts.benchmark.board import lost_from_words
-    from scripts.pages.page import Page, Part, command, publish
+    from scripts.pages.page import Part
 
     table = Table(
         title="level from which half of the runs are lost", title_justify="left",
@@ -148,17 +153,26 @@ def _tell(board: "Board", out: Path, spent_s: float) -> None:
     say(f"To cite: {escape(board.cite())}")
     if board.days_page:
         _tell_days(out)
-    reports = [command("report", out / track.name) for track in board.tracks[:3]]
+    _page(board, out, said, parts)
+    say(f"{escape(str(out))} ({spent_s:.0f} s)")
+
+
+def _page(board: "Board", out: Path, said: list[str], parts: list["Part"]) -> None:
+    from scripts.pages.page import Page, publish
+
+    head = board.head
+    then = {}
+    if head["seconds"] is None and head["seeds_of"] == "test":  # else it is for trying out
+        then["Hand it in:"] = command_line("benchmark", slam=board.subject, submit="NAME", out=out)
+    reports = [command_line("report", folder=out / name) for name in board.worst()[:3]]
     publish(out, Page(
         title=f"{board.subject} on {len(board.tracks)} track{'s' * (len(board.tracks) > 1)}",
         said=said, parts=parts,
         next={
-            "A track run by run, and what misled it:": "\n".join(reports),
-            "Hand it in:": command("benchmark", "--slam", board.subject, "--submit", "NAME"),
+            "Run by run, and what misled it, where it did worst:": "\n".join(reports), **then,
         },
-        settings={key: board.head[key] for key in ("seeds_of", "seeds", "levels_run", "world")},
+        settings={key: head[key] for key in ("seeds_of", "seeds", "levels_run", "world")},
     ))  # fmt: skip
-    say(f"{escape(str(out))} ({spent_s:.0f} s)")
 
 
 def _places(board: "Board") -> Table | None:

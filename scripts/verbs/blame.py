@@ -8,13 +8,17 @@ from scripts import options
 from scripts.console import console, say
 from scripts.debugger.question import Question
 from scripts.names import check, file_name, run_name
-from scripts.spec import SCENES, SLAMS, argument, option, part, spec
+from scripts.spec import SCENES, SLAMS, argument, command_line, option, part, spec
 from slam.errors import InvalidValueError
 from slam.evaluation.lost import Rule
+from slam.names import is_code
 
 if TYPE_CHECKING:
     from scripts.debugger.counterfactual import Inquest
     from scripts.debugger.recording import Case
+
+
+WORLD = ("scene", "seed", "dynamism", "motion", "change", "crowd")  # options of ``run``, too
 
 
 @spec
@@ -102,7 +106,7 @@ class Blame:
 
 def _tell(found: "Inquest", folder: Path, run: Path | None) -> None:
     from scripts.debugger.words import FIXED, headline, table
-    from scripts.pages.page import Page, Part, command, publish
+    from scripts.pages.page import Page, Part, publish
 
     says = headline(found)
     shown = table(found) if found.trials else None
@@ -118,14 +122,23 @@ def _tell(found: "Inquest", folder: Path, run: Path | None) -> None:
         Part(title="What happened, and what would have", picture="blame.png"),
         *([] if shown is None else [Part(title="The world again", note=fixed, table=shown)]),
     ]
-    then = {"The whole run as a film:": command("render", run)}
-    if run is None:
-        world = [f"--{name}={case.settings[name]}" for name in ("scene", "dynamism", "seed")]
-        then = {"The whole run as a film:": command("run", case.slam, *world)}
+    film = _film(case, run)
+    then = {"The whole run as a film:": film} if film else {}
     told = {"slam": case.slam, "seconds": case.seconds, "every": case.every, **case.settings}
     publish(folder, Page(
         title=f"What misled {case.slam}?", said=says, parts=parts, next=then, settings=told
     ))  # fmt: skip
+
+
+def _film(case: "Case", run: Path | None) -> str:
+    """What makes a film of the run; "" where options of the scene would be left out."""
+    if run is not None:
+        trust = is_code(case.settings["scene"])
+        return command_line("render", folder=run, slam=case.slam, trust=trust)
+    world = {name: case.settings.get(name) for name in WORLD}
+    if {*case.settings} - {*world, "scene_sha256"}:
+        return ""
+    return command_line("run", slam=case.slam, seconds=case.seconds, **world)
 
 
 def _path_m(found: "Inquest") -> float:

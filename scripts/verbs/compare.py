@@ -42,7 +42,10 @@ class Compare:
     )
     levels: options.Levels = part(options.Levels)
     seeds: int = option("Seeds at every level, the same at each.", 10)
-    first_seed: int = option("The first of them; the SLAMs here were tuned on 0 to 19.", 100)
+    first_seed: int = option(
+        "The first of them; the SLAMs here were tuned on 0 to 19.", 100,
+        fills=("Seeds.seed",),
+    )  # fmt: skip
     seconds: float = option("Length of a run, s.", 60.0)
     every: int | None = option("Use one scan in N; default about 4.7 a second.")
     scanner: str = options.SCANNER()
@@ -82,10 +85,13 @@ class Compare:
 
     def __call__(self) -> None:
         plan = self.plan()
-        from scripts import pace
-        from scripts.comparison.make import carry_out
+        from scripts import engine, pace
+        from scripts.comparison.make import study
         from scripts.comparison.plan import ahead
+        from scripts.days.buildings import beside
 
+        asked = study(plan, beside(plan) if plan.sessions is not None else None)
+        engine.refuse(asked, self.out)
         missing, every_job = ahead(plan, self.out)
         runs = f"{len(plan.runs())} runs, {len(plan.slams)} SLAMs on each"
         besides = ", buildings besides" if plan.sessions is not None else ""
@@ -94,12 +100,8 @@ class Compare:
         if self.work.plan_only:
             return
         started = time.perf_counter()
-        ways: dict[str, Any] = {"jobs": self.work.jobs, "cluster": self.work.cluster}
-        if plan.sessions is not None:
-            from scripts.days.buildings import beside
-
-            ways["more"] = beside(plan)
-        rows = carry_out(plan, self.out, **ways)
+        work = self.work
+        rows = engine.carry_out(asked, self.out, jobs=work.jobs, cluster=work.cluster)
         spent_s = time.perf_counter() - started
         tell(plan, rows)
         more = tell_ages(self.out) if plan.sessions is not None else ""

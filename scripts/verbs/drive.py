@@ -10,8 +10,8 @@ from rich.markup import escape
 
 from scripts import options
 from scripts.console import console, say
-from scripts.names import check
-from scripts.spec import REQUIRED, SCENES, SLAMS, argument, option, part, spec
+from scripts.names import check, scene_name
+from scripts.spec import REQUIRED, SCENES, SLAMS, argument, command_line, option, part, spec
 from slam.errors import InvalidValueError
 from slam.set_numbers import with_set
 
@@ -77,31 +77,38 @@ class Drive:
 
     def __call__(self) -> None:
         plan, out, jobs = self.plan(), self.out, self.work.jobs
-        from scripts import pace
-        from scripts.closed_loop.make import carry_out, said, success_table
+        from scripts import engine, pace
+        from scripts.closed_loop.make import check_goals, said, study, success_table
         from scripts.closed_loop.plan import RUNS
-        from scripts.pages.page import Page, Part, command, publish
+        from scripts.pages.page import Page, Part, publish
 
+        check_goals(plan)
+        asked = study(plan)
+        engine.refuse(asked, out)
         missing = [job for _, job in plan.jobs() if not (out / RUNS / job.file_name()).exists()]
         pace.announce(f"{len(missing)} drives", [job.work() for job in missing], jobs)
         if self.work.plan_only:
             return
         started = time.perf_counter()
-        rows = carry_out(plan, out, jobs=jobs)
+        rows = engine.carry_out(asked, out, jobs=jobs)
         table = success_table(plan, rows)
         console.print(table)
         parts = [
             Part(title="Goals reached", picture="closed_loop.png", table=table),
             Part(title="Ways driven", picture="paths.png"),
         ]
-        elsewhere = ("--slam", *plan.slams, "--scene", plan.scene, "--out", "out/compare")
+        compared = f"out/compare-{scene_name(plan.scene)}"
+        held = {"motion": plan.motion, "change": plan.change, plan.axis: plan.levels}
+        tour = command_line(
+            "compare", slam=plan.slams, scene=plan.scene, **held, crowd=plan.crowd,
+            seeds=max(plan.seeds) - min(plan.seeds) + 1, first_seed=min(plan.seeds),
+            scanner=plan.scanner, out=compared,
+        )  # fmt: skip
         publish(out, Page(
             title=f"{plan.scene}: steered by its SLAM", said=said(plan, rows), parts=parts,
             next={
-                "The same rooms on a tour that its errors do not steer:": command(
-                    "compare", *elsewhere
-                ),
-                "Both in one report:": command("report", "out/compare", "--drive", out),
+                "The same rooms on a tour that its errors do not steer:": tour,
+                "Both in one report:": command_line("report", folder=compared, drive=out),
             },
             settings=asdict(plan),
         ))  # fmt: skip

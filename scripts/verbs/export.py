@@ -32,7 +32,7 @@ class Export:
     )  # fmt: skip
     out: Path | None = option(
         "File to write; default beside the log or dataset. tum: NAME_odometry.tum, ...",
-        writes=True,
+        writes="file",
     )
     slam: str = option("With --to smfeval: whose poses.", SLAM, complete=SLAMS)
 
@@ -40,8 +40,6 @@ class Export:
         if self.slam != SLAM and self.to != "smfeval":
             raise InvalidValueError(f"--slam is for --to smfeval, got --to {self.to}")
         check([self.slam])
-        if self.out is not None and self.out.is_dir():
-            raise InvalidValueError(f"--out must be a file, got the folder {self.out}")
         suffix = ready(self.to).suffix
         from scripts.exports import Source, write
         from sim.recording.verify import check_bag

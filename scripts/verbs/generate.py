@@ -10,8 +10,9 @@ from scripts import options
 from scripts.console import console
 from scripts.formats import BAG, FORMATS, MINARI, ready
 from scripts.names import check
-from scripts.spec import REQUIRED, SCENES, argument, names_of, option, part, spec
+from scripts.spec import REQUIRED, SCENES, argument, command_line, names_of, option, part, spec
 from slam.errors import InvalidValueError
+from slam.names import is_code
 
 if TYPE_CHECKING:
     from rich.table import Table
@@ -107,7 +108,9 @@ class Generate:
         plan, out = self.plan(), self.out
         from scripts import pace
         from scripts.dataset import carry_out, rooms_of
+        from sim.recording.dataset import refuse_others
 
+        refuse_others(out, plan)
         there = set(os.listdir(out)) if out.is_dir() else set()
         missing = [job for job in plan.jobs() if not there.issuperset(plan.folders(job))]
         kind = "generate"
@@ -139,7 +142,7 @@ def _check_environment(plan: "Plan") -> None:
 
 def _page(plan: "Plan", out: Path, table: "Table") -> None:
     """What was made, a plan of the first episode at its start, and what it is good for."""
-    from scripts.pages.page import Page, Part, command, inline, publish
+    from scripts.pages.page import Page, Part, inline, publish
     from sim.simulation import Simulation
     from sim.view.mapview import MapView
 
@@ -148,6 +151,8 @@ def _page(plan: "Plan", out: Path, table: "Table") -> None:
     room.sense()
     start = inline(MapView(room.world.scene, 1080, 720).draw(room.world.mover_poses(), room.frame))
     about = {key: value for key, value in first.words().items() if value not in (None, {})}
+    here = Path("FOLDER")  # a dataset has the same bytes wherever it lies
+    one = here / names[0]
     page = Page(
         title=f"Episodes of {', '.join(plan.scenes or (first.scene,))}",
         said=[
@@ -159,9 +164,13 @@ def _page(plan: "Plan", out: Path, table: "Table") -> None:
             Part(title="Episode by episode", table=table),
         ],
         next={
-            "In this folder: is every byte still there?": command("verify", "."),
-            "A SLAM on the first of them:": command("run", "shunting", "--log", names[0]),
-            "The first of them as a film:": command("render", names[0]),
+            "Is every byte still there? FOLDER is that of this page:": command_line(
+                "verify", folder=here
+            ),
+            "A SLAM on the first of them:": command_line("run", slam="shunting", log=one),
+            "The first of them as a film:": command_line(
+                "render", folder=one, trust=is_code(first.scene)
+            ),
         },
         settings=about,
     )

@@ -2,6 +2,7 @@
 """``mobilia lifelong``: SLAMs over the sessions of a building, each in the map of those before."""
 
 from collections.abc import Iterator
+from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
@@ -10,7 +11,7 @@ from rich.markup import escape
 from scripts import options
 from scripts.console import console, say, working
 from scripts.names import check
-from scripts.spec import SCENES, SLAMS, argument, option, part, spec
+from scripts.spec import SCENES, SLAMS, argument, command_line, option, part, spec
 from slam.errors import InvalidValueError
 
 if TYPE_CHECKING:
@@ -58,18 +59,22 @@ class Lifelong:
             raise InvalidValueError("--slam must name at least one SLAM")
         check(names, self.scene)
         from scripts.days import sessions as days
+        from scripts.jobs import try_names
         from scripts.pace import Work, announce, timed
+        from scripts.whole_folder import replaceable
+
+        try_names(names, [] if self.scene is None else [self.scene])
 
         if self.folder is not None:
-            count = len(days.recorded(self.folder))  # complains before anything is written
+            count = len(days.recorded(self.folder))
             work = Work(f"lifelong, recorded, {' '.join(names)}", count)
-            announce(f"{count} sessions, {len(names)} SLAMs", [work])
+            ahead = f"{count} sessions"
             settings: dict[str, Any] = {"dataset": self.folder.name}
             drives = days.read(self.folder)
         else:
             recipe, first_s = self._recipe(), self._first_s()
             work = Work(f"lifelong {' '.join(names)}", first_s + self.seconds * (self.sessions - 1))
-            announce(f"{self.sessions} sessions of {self.scene}, {len(names)} SLAMs", [work])
+            ahead = f"{self.sessions} sessions of {self.scene}"
             drives = days.simulated(recipe, self.sessions, first_s)
             settings = {
                 "scene": recipe.scene, "seed": recipe.seed, "dynamism": recipe.dynamism,
@@ -77,9 +82,13 @@ class Lifelong:
                 "seconds": recipe.seconds, "first_seconds": first_s,
                 "scanner": recipe.scanner, "options": dict(recipe.options),
             }  # fmt: skip
+        settings = {"slams": names, **settings}
+        path = self.out or Path("out") / "lifelong"
+        replaceable(path, self.overwrite, "lifelong", settings)
+        announce(f"{ahead}, {len(names)} SLAMs", [work])
         if not self.plan_only:
             with timed(work):
-                self._live(names, drives, settings)
+                self._live(names, drives, settings, path)
 
     def _recipe(self) -> "Recipe":
         """Of the last session; ``InvalidValueError`` for what cannot be."""
@@ -107,19 +116,21 @@ class Lifelong:
         return first_s
 
     def _live(
-        self, names: list[str], drives: "Iterator[SessionDrive]", about: dict[str, Any]
+        self,
+        names: list[str],
+        drives: "Iterator[SessionDrive]",
+        settings: dict[str, Any],
+        path: Path,
     ) -> None:
         """Live it, write it, and say how it went."""
         from scripts.days import lifelong as life
         from scripts.days import tables
         from scripts.days.report import Changed, changes_of
         from scripts.output import write_recipe
-        from scripts.pages.page import Page, Part, command, tell
+        from scripts.pages.page import Page, Part, tell
         from scripts.pages.page import write as write_page
         from scripts.whole_folder import whole_folder
 
-        settings = {"slams": names, **about}
-        path = self.out or Path("out") / "lifelong"
         with whole_folder(
             path, overwrite=self.overwrite, command="lifelong", settings=settings
         ) as folder:
@@ -149,8 +160,9 @@ class Lifelong:
                 said=[tables.last_session(by_slam[first], changed.said)],
                 parts=[*changed.parts, *lives, *older], settings=settings,
                 next={} if living is None else {
-                    "A session of your own in this map:": command(
-                        "run", first, "--log", "LOG", "--map-in", path / living.map.name
+                    "A session of your own in this map:": command_line(
+                        "run", slam=first, log="LOG", map_in=path / living.map.name,
+                        map_out="NEXT.npz", at=_a_day_after(kept[max(kept)]),
                     )
                 },
             )  # fmt: skip
@@ -160,6 +172,11 @@ class Lifelong:
             console.print(tables.printed(name, own))
             say(escape(said[name]))
         tell(path, page)
+
+
+def _a_day_after(drive: "SessionDrive") -> str:
+    """As ``--at`` takes it."""
+    return f"{datetime.fromtimestamp(drive.time_s, UTC) + timedelta(days=1):%Y-%m-%dT%H:%M}"
 
 
 def _sentence(building: "Building", rows: list[Row], aged: list[Row]) -> str:

@@ -52,7 +52,8 @@ class Live:
     )
     browser: bool = option("Open the page in this machine's browser, too.", False, "--open")
     ros2: str | None = option(
-        "The robot on a network of ROS 2 as well: dds or zenoh (docs/ros2.md)."
+        "The robot on a network of ROS 2 as well: dds or zenoh (docs/ros2.md).",
+        choices=("dds", "zenoh"),
     )
     set_: list[str] | None = options.SET()
 

@@ -41,15 +41,15 @@ class Render:
         metavar="RUN",
     )
     out: Path | None = option(
-        "The film; default out/<name of RUN>.mp4.", writes=True, suffix=".mp4"
+        "The film; default out/<name of RUN>.mp4.", writes="file", suffix=".mp4"
     )
     slam: str | None = option("SLAM to film; default the run's own, else shunting.", complete=SLAMS)
     strip_to: Path | None = option(
-        "Also a PNG of some moments side by side.", None, "--strip", writes=True, suffix=".png"
+        "Also a PNG of some moments side by side.", None, "--strip", writes="file", suffix=".png"
     )
     at: str = option("Moments of the strip, s: 3,12.5,40. Default: six, evenly spaced.", "")
     replay: Path | None = option(
-        "Also a page to turn and to scrub, for any browser (.html).", writes=True, suffix=".html"
+        "Also a page to turn and to scrub, for any browser (.html).", writes="file", suffix=".html"
     )
     view: str = option(
         "View of the 3D camera: follow, top or persp.", "follow",

@@ -8,6 +8,7 @@ from rich.markup import escape
 
 from scripts.console import fact, say, working
 from scripts.spec import REQUIRED, SLAMS, argument, option, spec
+from slam.errors import MissingPathError
 
 if TYPE_CHECKING:
     from scripts.report.study import Study
@@ -39,6 +40,9 @@ class Report:
         from scripts.report.study import check_comparison, study
 
         check_comparison(self.folder)
+        for one in self.drive or ():
+            if not one.exists():
+                raise MissingPathError(one, "no such folder")
         found = [*(self.drive or []), *drives_in(self.folder)]
         about = study(self.folder, self.subject)
         with locked_folder(self.folder, "compare"):

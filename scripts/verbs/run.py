@@ -7,7 +7,7 @@ from scripts import options
 from scripts.names import check, run_name, scene_name
 from scripts.options import Recorded
 from scripts.spec import REQUIRED, SCENES, SLAMS, argument, option, part, spec
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, MissingPathError
 from slam.variants import MAP_ORACLE
 
 
@@ -43,7 +43,7 @@ class Run:
     map_in: Path | None = option(
         "Begin anywhere in this map of days before (docs/days.md); with --log."
     )
-    map_out: Path | None = option("Keep the map, this session included; with --log.", writes=True)
+    map_out: Path | None = option("Keep the map, this session included; with --log.", writes="file")
     at: str | None = option("When the session began, 2026-05-04T09:00; default the log's clock.")
     oracle: list[str] | None = options.ORACLES()
     set_: list[str] | None = options.SET()
@@ -62,6 +62,8 @@ class Run:
             self._on_log(slams, self.log)
 
     def _on_scene(self, slams: list[str], scene: str) -> None:
+        for text in self.recorded.laser or ():
+            options.place_of(text, "--laser")
         if self.recorded != Recorded():
             raise InvalidValueError(
                 "--strict, --format, --scan, --odometry, --laser and --flip are about a --log"
@@ -78,12 +80,20 @@ class Run:
         on_scene(slams, self.tour.settings(scene), outputs, plan_only=self.plan_only)
 
     def _on_log(self, slams: list[str], log: Path) -> None:
+        from scripts.jobs import try_names
+        from scripts.output import refuse_others
         from scripts.pace import announce, timed
         from scripts.single_run.run import Log, Maps, on_log, on_log_work
+        from slam.logs.open import format_of
 
         maps = Maps(map_in=self.map_in, map_out=self.map_out, at=self.at)
         folder = self.out or Path("out") / f"run-{run_name(log)}"
         recorded = Log(path=log, **vars(self.recorded))
+        if not log.exists():
+            raise MissingPathError(log, "no such file")
+        format_of(log, recorded.text_format)
+        try_names(slams, ())
+        refuse_others(folder, "run")
         work = on_log_work(slams, log, self.film)
         filmed = ", filmed" * self.film
         announce(f"{log.name}, {work.amount / len(slams):.1f} MB{filmed}", [work])

@@ -7,7 +7,7 @@ from pathlib import Path
 from scripts import options
 from scripts.names import run_name
 from scripts.spec import REQUIRED, argument, option, spec
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, LogFormatError
 
 NAME = "recorded"
 MOST_OFFSET_S = 1e10  # 300 years: what is more is no clock
@@ -43,6 +43,7 @@ class Score:
         from scripts.single_run.run import Log, on_log
         from slam.frames import EPOCH, NS_PER_S
         from slam.logs.bag import frames_of_odometry, read_bag
+        from slam.logs.bag_topics import is_bag
         from slam.ros.messages import ODOM
         from slam.ros.recorded import RecordedSlam, aligned, is_odometry, read_statements
         from slam.shaped import within
@@ -50,6 +51,9 @@ class Score:
 
         within("--clock-offset", self.clock_offset, -MOST_OFFSET_S, MOST_OFFSET_S)
         log = self.bag if self.on is None else self.on
+        for path in (self.bag, log):
+            if path.exists() and not is_bag(path):
+                raise LogFormatError(path, "is no bag of ROS: its folder, .mcap, .db3 or .bag")
         stream = read_bag(log)
         odom, robot = frames_of_odometry(log)
         if self.odom_frame not in (None, odom or self.odom_frame):

@@ -9,7 +9,7 @@ from rich.markup import escape
 from scripts import options
 from scripts.console import console, plain_table, say, working
 from scripts.names import check, run_name
-from scripts.spec import REQUIRED, SCENES, argument, option, spec
+from scripts.spec import REQUIRED, SCENES, argument, command_line, option, spec
 from slam.errors import InvalidValueError
 
 SHOWN = ("beams", "median_m", "within_5_cm", "within_10_cm")
@@ -78,4 +78,5 @@ class Twin:
         for name, part in made.beside.words().items():
             table.add_row(name, *(f"{part.get(key, float('nan')):g}" for key in SHOWN))
         console.print(table)
-        say(f"{escape(str(folder))}: look at differences.png, run SLAMs with --log twin.log")
+        say(f"Look at [bold]{escape(str(folder / 'differences.png'))}[/bold]. A SLAM in the twin:")
+        say(escape(command_line("run", slam="shunting", log=folder / "twin.log")), highlight=False)

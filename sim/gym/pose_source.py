@@ -45,7 +45,7 @@ class PoseSource:
         if self._system is not None:
             self._track = Track(name=self._name, system=self._system)
             try:
-                with judged():
+                with judged(self._system.reset):
                     self._system.reset()
             except SlamFailedError as error:
                 raise error.at(f"SLAM '{self._name}', reset()") from error

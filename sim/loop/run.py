@@ -222,7 +222,7 @@ class _Ride:
         self._motion = MotionSum()
         self._firsts: list[int] = []  # rows at which goals begin
         try:
-            with judged():
+            with judged(system.reset):
                 system.reset()
         except SlamFailedError as error:
             self._failure = error.at(f"SLAM '{name}', reset()")

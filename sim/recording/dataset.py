@@ -325,17 +325,25 @@ def _clear(path: Path) -> None:
 
 
 def _claim(path: Path, plan: Plan) -> None:
-    """Leave the plan in an empty folder; refuse one that has another."""
+    """Leave the plan in an empty folder."""
+    refuse_others(path, plan)
+    if not (path / PLAN).exists():
+        write_text(path / PLAN, plan.text())
+
+
+def refuse_others(path: Path, plan: Plan) -> None:
+    """``OutputError`` for a folder that has another plan, or files and none."""
     file = path / PLAN
+    if path.exists() and not path.is_dir():
+        raise OutputError(f"{path} is a file; --out needs a folder")
     if file.exists():
         bounded.check_file(file)
         if file.read_text(encoding="utf-8", errors="replace") != plan.text():
             raise OutputError(f"{file} is of another dataset: choose another --out")
         return
-    others = [name for name in os.listdir(path) if name not in locks.NAMES and not is_part(name)]
-    if others:
+    there = os.listdir(path) if path.is_dir() else ()
+    if any(name not in locks.NAMES and not is_part(name) for name in there):
         raise OutputError(f"{path} holds files that are no dataset: choose another --out")
-    write_text(file, plan.text())
 
 
 def episodes_in(path: Path) -> list[Path]:

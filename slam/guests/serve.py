@@ -56,7 +56,7 @@ class Server:
         if kind == "frame":
             return self._frame(self._system, message)
         if kind == "reset":
-            with judged():
+            with judged(self._system.reset):
                 self._system.reset()
             self._laser, self._stamps = None, []
             return protocol.line({"type": "reset"})

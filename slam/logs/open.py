@@ -13,7 +13,7 @@ from slam.logs.carmen import is_carmen, read_carmen
 from slam.logs.centimetre import is_centimetre, read_centimetre
 from slam.logs.foreign import what_instead
 from slam.logs.rawlog import is_rawlog, read_rawlog
-from slam.logs.rover import read_rover
+from slam.logs.rover import read_format, read_rover
 from slam.logs.victoria_park import is_victoria_park, read_victoria_park
 
 _NAMED = 3  # recordings of a folder that a message names
@@ -78,15 +78,26 @@ def open_log(
     Raises ``LogFormatError`` when the file is missing, damaged or of no known format.
     """
     path = Path(path)
+    log_format = format_of(path, text_format)
+    if log_format is None:
+        return read_rover(path, str(text_format), strict=strict)
+    return log_format.read(path, strict)
+
+
+def format_of(path: Path, text_format: str | Path | None = None) -> LogFormat | None:
+    """What the log at ``path`` is, None with a ``text_format``; raises as ``open_log``, of what a
+    glance tells.
+    """
     if not is_bag(path) and (what := what_instead(path)):  # a bag says it itself
         raise LogFormatError(path, what)
     if text_format is not None:
-        return read_rover(path, text_format, strict=strict)
+        read_format(text_format)
+        return None
     if path.is_dir() and not (is_bag(path) or is_victoria_park(path)):
         raise LogFormatError(path, _what_folder(path))
     for log_format in (*FORMATS, *_registered):
         if log_format.recognises(path):
-            return log_format.read(path, strict)
+            return log_format
     known = "; ".join(log_format.description for log_format in (*FORMATS, *_registered))
     raise LogFormatError(
         path, f"of no known format; known: {known}; others by a description of their columns "
@@ -100,6 +111,11 @@ def _what_folder(path: Path) -> str:
         inside = sorted(child.name for child in path.iterdir() if is_bag(child))
     except OSError as error:
         return f"cannot be read: {error.strerror or error}"
+    if poses := sorted(one.name for one in path.glob("trajectory_*.tum")):
+        return (
+            f"is of a run, and has its poses as TUM: {', '.join(poses)}. Its scans are in the log "
+            "or the scene that it was on; an episode of mobilia generate keeps both"
+        )
     if not inside:
         return "is a folder, not a regular file, and neither a bag nor Victoria Park"
     few = ", ".join(inside[:_NAMED]) + (", ..." if len(inside) > _NAMED else "")

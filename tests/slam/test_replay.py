@@ -3,6 +3,7 @@
 
 import pickle
 import re
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -107,6 +108,24 @@ def fail(_frame: Frame) -> Estimate:
             "nan",
         ),
         (
+            lambda frame: Estimate(
+                stamp_ns=frame.stamp_ns, T_map_robot=np.zeros(3), covariance=np.zeros((2, 2))
+            ),
+            "covariance must have shape (3, 3), got (2, 2)",
+            "bad",
+        ),
+        (
+            lambda frame: Estimate(
+                stamp_ns=frame.stamp_ns,
+                T_map_robot=np.zeros(3),
+                covariance=np.eye(3),
+                converged="no",
+            ),
+            "converged must be True or False, got 'no'",
+            "bad",
+        ),
+        (lambda frame: sys.exit(3), "raised SystemExit: 3", "raised"),
+        (
             lambda frame: Estimate(stamp_ns=7, T_map_robot=np.zeros(3), covariance=np.eye(3)),
             "for 7 ns instead of 2 ns",
             "bad",
@@ -118,6 +137,7 @@ def test_a_failing_guest_is_named_with_the_scan_and_how_it_failed(answer, says, 
     with pytest.raises(SlamFailedError, match=rf"SLAM 'guest', scan 2, .*{re.escape(says)}") as got:
         list(replay.run(frames()))
     assert got.value.outcome == outcome
+    assert re.search(r" \(test_replay\.py:\d+\)$", str(got.value))
     copied = pickle.loads(pickle.dumps(got.value))
     assert (str(copied), copied.outcome) == (str(got.value), outcome)
 

@@ -94,7 +94,7 @@ def test_what_is_no_run_is_told_in_a_line(run, tmp_path):
          "made by 'mobilia drive', where each SLAM's robot went its own way"),
         ('{"command": "run", "settings": {"log": "a.log"}}', "this run was on a log"),
         ('{"world": 2, "settings": {"log": "a.log", "slams": ["ekf"]}}',
-         "render 'a.log' itself with --slam ekf"),
+         "the film of the log is mobilia render a.log --slam ekf"),
         ('{"world": 2, "settings": {"scene": "arena", "seconds": "long"}}',
          "no recipe of a run: seconds must be a number"),
         ('{"world": 2, "settings": {"scene": "arena", "seconds": 5, "slams": 7}}',

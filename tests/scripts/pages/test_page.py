@@ -7,8 +7,9 @@ from pathlib import Path
 import numpy as np
 from rich.table import Table
 
-from scripts.pages.page import Page, Part, command, inline, write
+from scripts.pages.page import Page, Part, inline, write
 from scripts.pages.table import Cell, grid, of_printed
+from scripts.spec import command_line
 
 
 def made(folder: Path, **more) -> str:
@@ -22,7 +23,8 @@ def made(folder: Path, **more) -> str:
     ]
     page = Page(
         title="<b>", said=["`x` was off by 2 cm."], parts=parts,
-        next={"Why?": command("blame", "a folder")}, settings={"seed": 3, "crowd": None}, **more,
+        next={"Why?": command_line("blame", folder="a folder")},
+        settings={"seed": 3, "crowd": None}, **more,
     )  # fmt: skip
     return write(folder, page).read_text()
 

@@ -111,6 +111,10 @@ def test_the_sentence_of_each_case(case: Standing, said: str):
     assert answer(case) == f"`{MINE}` {said}"
 
 
+def test_what_is_lost_at_times_does_not_hold():
+    assert "; half of the runs or more are lost at 1, so at least" in answer(of([4, 4, 10]))
+
+
 def test_people_are_named_where_they_are_what_is_varied():
     case = replace(of([0, 0, 10], levels=(0.0, 8.0, 12.0)), axis="people", scene="intel.toml")
     said = "it holds at 8 and is lost from 12 people on in intel.toml, so at least 72 %"
