@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """A dataset as a whole: the episodes that are missing, on all processes, with a progress bar."""
 
-import json
 import re
 import time
 from collections.abc import Callable, Iterator
@@ -18,11 +17,13 @@ from scripts.console import note, plain_table, progress
 from scripts.formats import MINARI, write_beside
 from scripts.options import rate_hz
 from scripts.pace import Work, learn
-from sim.recording.dataset import Dataset, Plan, writing
+from scripts.pages.table import NONE
+from sim.recording.dataset import MAX_BYTES, Dataset, Plan, writing
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.splits import part_of
-from sim.recording.sums import write_sums
+from sim.recording.sums import SUMS, write_sums
+from slam.bounded import json_of
 from slam.files import part_of as part_folder
 from slam.files import put
 
@@ -134,16 +135,19 @@ def _offline(plan: Plan, out: Path, ways: dict[str, Any]) -> Table:
         table.add_column(heading, overflow="fold")
     with writing(out, plan) as dataset, progress() as bar:
         task = bar.add_task("driving", total=len(plan.jobs()), unit="")
+        sums = dataset.path / SUMS
         for name, recipes in rooms_of(plan).items():
             folder = dataset.path / name
             if not folder.exists():
+                sums.unlink(missing_ok=True)  # whole no more; else damage would be listed as sound
                 part = part_folder(folder)
                 write(part, name, recipes[0], _drives(recipes, ways, partial(bar.advance, task)))
                 put(part, folder)
-            told = json.loads((folder / "data" / "metadata.json").read_text(encoding="utf-8"))
+            told = json_of(folder / "data" / "metadata.json", MAX_BYTES, "metadata of Minari")
             keys = ("total_episodes", "total_steps", "description")
-            table.add_row(name, *(str(told[key]) for key in keys))
-        write_sums(dataset.path)
+            table.add_row(name, *(escape(str(told.get(key, NONE))) for key in keys))
+        if not sums.exists():
+            write_sums(dataset.path)
     return table
 
 

@@ -210,7 +210,8 @@ def _packed(target: Path, source: Source, plugin: StoragePlugin) -> list[Path]:
                 if key not in made:
                     made[key] = _added(writer, theirs, source.log)
                 writer.write(made[key], stamp_ns, data)
-        next(folder.glob(f"*{target.suffix}")).replace(temporary)
+        (packed,) = set(folder.iterdir()) - {folder / "metadata.yaml"}
+        packed.replace(temporary)
     return [target]
 
 

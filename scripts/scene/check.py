@@ -110,34 +110,36 @@ class _Ground:
         return {k: [] for k in large[:MOST_TOLD]}
 
     def why(self, label: int, goals: Sequence[str]) -> str:
-        """Which walls shut a part off, or how narrow the way to it is."""
-        part = self.labels == label
-        deep = np.where(part, self.grid.clearance, 0.0)
-        x, y = self._at(int(np.argmax(deep)))
+        """Which walls shut a part off, or how narrow the widest way to it is."""
+        here, part = self.labels == self.own, self.labels == label
+        x, y = self._at(int(np.argmax(np.where(part, self.grid.clearance, 0.0))))
         with_goals = f", with goals {', '.join(goals)}," if goals else ""
-        here = self.labels == self.own
-        away = _away(here) + _away(part)
-        between = self._at(int(np.argmin(away)))
-        ends = [self._nearest(mask, between) for mask in (here, part)]
-        n = min(max(2, round(math.dist(*ends) / STEP_M)), MOST_STEPS)
-        (a, b), (c, d) = ends
-        line = np.column_stack([np.linspace(a, c, n), np.linspace(b, d, n)])
-        gaps = np.array([gap_to_boxes(line, box[None]) for box in self.scene.obstacles])
         told = (
             f"{self._area(part):.0f} m2 of floor about ({x:.1f}, {y:.1f}){with_goals} cannot be "
             "reached from the start: "
         )
-        crossed = np.flatnonzero(gaps.min(axis=1) == 0.0)
-        if len(crossed):
-            crossed = crossed[np.argsort(gaps[crossed].argmin(axis=1), kind="stable")]
-            more = f" (and {len(crossed) - MOST_NAMED} more)" if len(crossed) > MOST_NAMED else ""
-            return f"{told}{self._names(crossed[:MOST_NAMED].tolist())}{more} shuts it off"
-        narrow = int(np.argmin(gaps.min(axis=0)))
-        u, v = line[narrow].tolist()
+        way = self._widest(self.grid.clearance, here, part)
+        if way is None:
+            return f"{told}{self._between(here, part)}"
+        wide, (u, v) = way
         return (
-            f"{told}the way is {2.0 * gaps[:, narrow].min():.2f} m wide at ({u:.2f}, {v:.2f}), "
+            f"{told}the way is {wide:.2f} m wide at ({u:.2f}, {v:.2f}), "
             f"{self.beside((u, v))}; the robot needs {2.0 * self.robot_m:.2f} m"
         )
+
+    def _between(self, here: Mask, part: Mask) -> str:
+        """What stands where they are nearest to each other shuts one off from the other."""
+        between = self._at(int(np.argmin(_away(here) + _away(part))))
+        (a, b), (c, d) = (self._nearest(mask, between) for mask in (here, part))
+        n = min(max(2, round(math.dist((a, b), (c, d)) / STEP_M)), MOST_STEPS)
+        line = np.column_stack([np.linspace(a, c, n), np.linspace(b, d, n)])
+        gaps = np.array([gap_to_boxes(line, box[None]) for box in self.scene.obstacles])
+        nearest = gaps.min(axis=1)
+        crossed = np.flatnonzero(nearest == nearest.min())  # 0, but for gaps that are not told
+        crossed = crossed[np.argsort(gaps[crossed].argmin(axis=1), kind="stable")]
+        more = f" (and {len(crossed) - MOST_NAMED} more)" if len(crossed) > MOST_NAMED else ""
+        shut = "shuts" if len(crossed) == 1 else "shut"
+        return f"{self._names(crossed[:MOST_NAMED].tolist())}{more} {shut} it off"
 
     def gap_to_nowhere(self) -> tuple[float, tuple[float, float]] | None:
         """The widest way from the start or a goal out of the scene: how wide at its narrowest, and
@@ -155,20 +157,28 @@ class _Ground:
         column, row = (
             np.clip(at, 0, n - 1) for at, n in zip(cells, clear.shape[::-1], strict=True)
         )
-        low, high = 0.5 * NARROW_M, float(clear[row, column].max())
+        here = np.zeros(clear.shape, dtype=bool)
+        here[row, column] = True
+        return self._widest(clear, here, self._edge)
+
+    def _widest(
+        self, clear: Float, here: Mask, there: Mask
+    ) -> tuple[float, tuple[float, float]] | None:
+        """The widest way from one to the other: how wide at its narrowest, and where; None where
+        none is wider than ``NARROW_M``."""
 
         def way(least: float) -> Mask:
             labels = _parts(clear > least)
-            return np.isin(labels, np.setdiff1d(labels[row, column], [0]))
+            return np.isin(labels, np.setdiff1d(labels[here], [0]))
 
-        if not (way(low) & self._edge).any():
+        low, high = 0.5 * NARROW_M, float(clear[here].max())
+        if not (way(low) & there).any():
             return None
         for _ in range(12):
             middle = 0.5 * (low + high)
-            low, high = (middle, high) if (way(middle) & self._edge).any() else (low, middle)
-        inner, wide = way(high), _parts(clear > high)
-        inner[row, column] = True
-        outer = self._edge | np.isin(wide, np.setdiff1d(np.unique(wide[self._edge]), [0]))
+            low, high = (middle, high) if (way(middle) & there).any() else (low, middle)
+        inner, wide = way(high) | here, _parts(clear > high)
+        outer = there | np.isin(wide, np.setdiff1d(np.unique(wide[there]), [0]))
         between = np.where(way(low), np.maximum(_away(inner), _away(outer & ~inner)), np.inf)
         return 2.0 * low, self._at(int(np.argmin(between)))
 

@@ -86,6 +86,7 @@ def test_seats_that_come_with_a_table_are_optional(lab):
             "[[4, 2.5], [4, 5]]",
             r"with goals 1, .* 0\.[34]\d m wide at \([34].*, 2\..*'door_frame0'.* needs 0\.57 m",
         ),
+        ("[[4, 2.98], [4, 5]]", "[[4, 2.3], [4, 5]]", r"0\.[12]\d m wide at .* needs 0\.57 m"),
     ],
 )
 def test_check_names_what_is_wrong(lab, was, is_, says):
