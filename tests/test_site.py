@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 
 from scripts.cli import app
 from scripts.site.check import faults, main
-from scripts.site.columns import as_markdown
 
 pytestmark = pytest.mark.docs
 REPO = Path(__file__).resolve().parents[1]
@@ -143,23 +142,3 @@ def test_the_dataset_blocks_run(
         assert done.exit_code == 0, done.output
         exec(code, {})
         assert ", 361)" in capsys.readouterr().out
-
-
-def test_columns_of_a_docstring_become_a_list():
-    text = """A camera.
-
-    with Camera() as camera:
-        camera.render()
-
-width, height  px
-shadows        of the sun;
-               half the cost
-
-Raises an error. It has  two blanks, and stays.
-For example
-    camera.close()"""
-    assert as_markdown(text).splitlines() == [
-        "A camera.", "", "    with Camera() as camera:", "        camera.render()", "",
-        "- `width`, `height`: px", "- `shadows`: of the sun; half the cost", "",
-        "Raises an error. It has  two blanks, and stays.", "For example", "", "    camera.close()",
-    ]  # fmt: skip

@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compile cache notices a change in a kernel of another module; compiling is said once."""
 
-import gc
 import hashlib
 import logging
 import os
@@ -13,9 +12,8 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from numba.core import event
 
-from slam._jit import COMPILING, announced, inner, uncounted
+from slam._jit import announced, inner, uncounted
 from tests.processes import python
 
 pytestmark = pytest.mark.slow
@@ -192,30 +190,6 @@ def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptu
         with announced("the test's kernel", 2.0):
             twice(3)
         assert len(caplog.records) == 1
-
-
-@pytest.mark.parametrize("collected", [False, True])
-def test_the_collector_rests_while_a_kernel_compiles_and_is_left_as_it_was(collected: bool) -> None:
-    resting = []
-
-    class Look(event.Listener):
-        def on_start(self, event: object) -> None:
-            resting.append(not gc.isenabled())
-
-        def on_end(self, event: object) -> None: ...
-
-    was = gc.isenabled()
-    (gc.enable if collected else gc.disable)()
-    try:
-        with event.install_listener(COMPILING, Look()):
-            assert numba.njit(lambda x: x + 1)(1) == 2
-            with pytest.raises(numba.core.errors.TypingError):
-                numba.njit(lambda x: x.nothing)(1)
-        assert resting
-        assert all(resting)
-        assert gc.isenabled() is collected
-    finally:
-        (gc.enable if was else gc.disable)()
 
 
 def test_an_implementation_that_fitted_other_types_is_not_taken_for_these() -> None:

@@ -132,15 +132,6 @@ def test_the_page_has_every_track():
     assert tracks_table(list(newest().values())) in (DOCS / "benchmark.md").read_text()
 
 
-def test_a_harder_version_is_the_newest_and_the_first_still_runs():
-    """On the seeds that it was published with."""
-    first, second = TRACKS["moving-boards-v1"], TRACKS["moving-boards-v2"]
-    assert chosen(["moving-boards"]) == (second,)
-    assert chosen(["moving-boards-v1"]) == (first,)
-    assert (first.test, second.test) == (TEST, FRESH)
-    assert len(first.plan(("ekf",), first.test[:2]).runs()) == 2 * len(LEVELS)
-
-
 def test_names_may_leave_out_the_version_and_a_wrong_one_is_told():
     assert chosen(["tour-guide", "no-walls-v1"]) == (newest()["tour-guide"], TRACKS["no-walls-v1"])
     with pytest.raises(UnknownNameError, match=r"'tour-giude'.*tour-guide"):

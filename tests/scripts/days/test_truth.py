@@ -10,7 +10,6 @@ from scripts.days.lifelong import COLUMNS
 from scripts.days.report import operator, summed
 from scripts.days.tables import last_session, printed
 from scripts.days.truth import Spot, Still, ages_of, scored, stands_there, verdicts
-from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.days.changes import Change
 from slam.tracker.belief.state import State
 
@@ -65,14 +64,6 @@ def test_a_page_says_how_the_last_session_ended():
     assert list(session.cells) == ["2", "3"]
     failed = [row(1, map="anew", place="failed")]
     assert last_session(failed, "1 thing moved") == "Session 1: 1 thing moved; `s` failed."
-
-
-def test_sessions_follow_the_clock():
-    times = [clock_s(k) for k in range(MOST_SESSIONS)]
-    assert times == sorted(set(times))
-    assert times[0] == 9.0 * 3600.0
-    assert times[5] - times[0] == 24.0 * 3600.0
-    assert (times[4] / 3600.0) % 24.0 == time_of(4).hour - 24.0
 
 
 @pytest.mark.parametrize(

@@ -8,8 +8,8 @@ import numpy as np
 import pytest
 
 from scripts.film.chart import BAND_PALE, ErrorChart, Series
-from sim.events import KIDNAP, Event
-from sim.view.draw import INK, MAGENTA, ORANGE, RED, paler
+from sim.events import Event
+from sim.view.draw import MAGENTA, ORANGE, RED, paler
 from sim.view.moment import Shown
 
 pytestmark = pytest.mark.film
@@ -90,13 +90,3 @@ def test_events_stand_at_their_times_and_in_their_lanes():
     at = {c: np.argwhere((picture == c).all(axis=2) & changed) for c in (MAGENTA, RED)}
     assert len(at[MAGENTA]) > 0
     assert at[MAGENTA][:, 0].max() < at[RED][:, 0].min()
-
-
-def test_a_kidnap_is_a_line_through_everything():
-    picture = chart().paint(
-        {"shunting": series(0.01, 0.01)}, [Event(kind=KIDNAP, name="", start_s=30.0, end_s=30.0)]
-    )
-    still = chart().paint({"shunting": series(0.01, 0.01)}, ())
-    x = round(58 + (600 - 68) / 2)
-    assert (picture[:, x] != still[:, x]).any(axis=1).sum() > 150
-    assert (picture[215, x] == INK).all()

@@ -6,7 +6,6 @@ import pytest
 
 from scripts.film.encode import FILM_S, LAPSE_FPS, MOST_PICTURES, Pace
 from scripts.single_run.session import drawn, for_file
-from sim.view import moment
 from slam import create
 from slam.frames import LaserSpec, Scan
 from slam.frontend.seen_space import SeenSpace
@@ -50,15 +49,6 @@ def test_a_map_in_pictures_keeps_thin_walls_and_its_extent():
         drawn(Track("kept", Kept(raster)), most=1001).map.values, raster.values
     )
     assert drawn(Track("none", create("odometry"))) is None
-
-
-def test_a_map_as_shown_keeps_thin_walls(monkeypatch):
-    raster = made(1001, 530)
-    monkeypatch.setattr(moment, "MOST_CELLS", 300)
-    found = moment.small_map(Track("kept", Kept(raster)))
-    assert max(found.values.shape) <= 300
-    assert found.resolution_m == pytest.approx(4 * CELL)
-    assert np.nanmax(found.values) == np.nanmax(raster.values)
 
 
 def test_a_map_too_large_for_an_image_has_coarser_cells_and_says_so(monkeypatch):

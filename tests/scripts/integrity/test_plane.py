@@ -10,11 +10,10 @@ import pytest
 
 from scripts.integrity import driving
 from scripts.integrity.geometry import first_hits
-from scripts.integrity.kinds import KINDS, LAYOUTS, PARTS, StreamSpec
+from scripts.integrity.kinds import KINDS, LAYOUTS, StreamSpec
 from scripts.integrity.layouts import CLEAR_M, layout
 from scripts.integrity.movers import KEEP_M
 from scripts.integrity.plane import frames, world
-from scripts.integrity.things import BOARD, THING
 from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import BeamClass
@@ -71,13 +70,6 @@ def clear_m(points, plan) -> float:
     return float(least)
 
 
-def test_a_building_is_the_same_after_half_a_turn():
-    walls = layout("halfturn", np.random.default_rng([3, 0])).walls + 0.0
-    assert {tuple(wall) for wall in walls.tolist()} == {
-        tuple(wall) for wall in (0.0 - walls).tolist()
-    }
-
-
 @pytest.mark.parametrize("model", ["fifth", "biased", "stated", "good"])
 def test_wheels_err_as_their_model_says(model):
     d, turn, n = 0.04, 0.03, 6000
@@ -109,20 +101,6 @@ def test_one_seed_gives_the_same_bytes_and_another_others():
             found.update(frame.labels.kind.tobytes())
         digests.append(found.hexdigest())
     assert digests[0] == digests[2] != digests[1]
-
-
-def test_parts_have_generators_of_their_own():
-    spec = StreamSpec(kind="moved15", seed=2, seconds=4.0)
-    again = world(StreamSpec(kind="moved15", seed=2, again=1, seconds=4.0))
-    more = world(StreamSpec(kind="moved15", seed=2, seconds=4.0, changes=(("boards", 0),)))
-    first = world(spec)
-    assert np.array_equal(first.layout.walls, again.layout.walls)
-    assert not np.allclose(first.robot[0], again.robot[0])
-    assert np.array_equal(first.robot, more.robot)
-    chairs, traits = first.things["kind"] < BOARD, list(THING.names[: THING.names.index("x")])
-    assert np.array_equal(first.things[chairs][traits], more.things[traits])
-    draws = {float(spec.rng(part).random()) for part in PARTS}
-    assert len(draws) == len(PARTS)
 
 
 def test_noise_dropouts_and_labels_are_as_stated():

@@ -8,7 +8,6 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -16,7 +15,7 @@ from scripts import cli
 from scripts.closed_loop.tables import driven
 from scripts.comparison import folder as files
 from scripts.metrics.table import METRICS, digits
-from scripts.report import page, pictures, tables
+from scripts.report import page, tables
 from scripts.report.study import study, verdict
 from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made
@@ -144,11 +143,6 @@ def test_tables_of_one_column_or_row_are_one_table(tmp_path: Path, keep, head, f
         assert [row[0].text for row in table.rows] == one.rivals
 
 
-def test_the_moving_share_counts_beams_on_what_moves(folder: Path):
-    run = study(folder).compared.run("room", 1.0, 100)
-    np.testing.assert_array_equal(pictures.moving_share(run), np.arange(made.SCANS) % 2 == 0)
-
-
 def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path):
     drive = driven(made.make_drive(tmp_path / "drive"))
     assert drive.levels == [0.0, 1.0]
@@ -179,12 +173,6 @@ def test_what_is_no_drive_is_told(tmp_path: Path, name: str, content: str, says:
     (folder / name).write_text(content)
     with pytest.raises(LogFormatError, match=says):
         driven(folder)
-
-
-def test_little_is_enough_for_a_page(tmp_path: Path):
-    folder = made.make(tmp_path / "compare", seeds=(100,))
-    kept(folder, lambda row: row["dynamism"] == 1.0 and row["slam"] == made.OWN)  # all failed
-    assert "Where" not in page.render(study(folder))
 
 
 def test_the_page_is_about_whom_one_asks(written: Path, tmp_path: Path):

@@ -24,7 +24,7 @@ from sim.recording.dataset import Plan, check_dataset, read_plan, writing
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, write_sums
 from sim.recording.verify import regenerate
-from slam.errors import InvalidValueError, LogFormatError, OutputError
+from slam.errors import LogFormatError, OutputError
 from slam.logs import read_bag
 from tests.processes import python
 
@@ -195,11 +195,6 @@ def test_two_writers_another_plan_and_foreign_files_are_refused(serial, tmp_path
     with pytest.raises(OutputError, match=r"thesis\.tex"):
         generate(["arena"], tmp_path / "mine" / "thesis.tex", **SETTINGS)
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
-
-
-def test_a_cluster_that_is_nowhere_is_refused(tmp_path):
-    with pytest.raises(InvalidValueError, match="no Dask scheduler"):
-        generate(["arena"], tmp_path / "b", **SETTINGS, cluster="nowhere")
 
 
 def test_twins_share_path_and_odometry_and_differ_in_what_moves(tmp_path):
