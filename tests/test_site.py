@@ -127,9 +127,7 @@ def test_the_policy_blocks_run(block: int, capsys: pytest.CaptureFixture[str]):
     assert block or f"It prints `{printed}`" in (DOCS / "jobs/my_policy.md").read_text()
 
 
-def test_the_dataset_blocks_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_the_dataset_blocks_run(tmp_path, monkeypatch, capsys):
     """On shorter episodes, where the extra ``data`` is."""
     pytest.importorskip("minari")
     monkeypatch.chdir(tmp_path)

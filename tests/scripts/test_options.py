@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import sim
 from scripts.cli import app
 from scripts.closed_loop.plan import DrivePlan
 from scripts.comparison import schema
@@ -134,28 +133,6 @@ def test_a_title_says_what_was_given():
     assert title_of(settings) == "arena · dynamism 0.5 · seed 4"
     more = {**settings, "motion": 0.2, "change": None, "crowd": "boards:1"}
     assert title_of(more) == "arena · dynamism 0.5 · motion 0.2 · crowd boards:1 · seed 4"
-
-
-def test_an_environment_has_the_knobs_and_a_reset_may_replace_them():
-    env = gymnasium.make(
-        "mobilia/Arena-v2", disable_env_checker=True, motion=0.0, change=0.25, crowd="escorts:2"
-    ).unwrapped
-    space = env.observation_space
-    env.reset(seed=1)
-    world = env.simulation.world
-    assert (world.rates.crowd, world.rates.change) == (0.0, 0.25)
-    assert "escort1" in world.mover_names
-    env.reset(seed=1, options={"crowd": "none", "motion": 0.5, "change": 0.0})
-    world = env.simulation.world
-    assert (world.rates.crowd, world.rates.change) == (0.5, 0.0)
-    assert "escort0" not in world.mover_names
-    assert env.observation_space == space
-    for name, value in (("crowd", "dragons:2"), ("motion", 2.0), ("change", "much")):
-        with pytest.raises(InvalidValueError, match=name):
-            env.reset(options={name: value})
-        with pytest.raises(InvalidValueError, match=name):
-            gymnasium.make("mobilia/Arena-v2", disable_env_checker=True, **{name: value})
-    assert sim is not None
 
 
 def test_a_run_keeps_its_scanner_in_the_recipe_and_is_filmed_with_it(tmp_path: Path) -> None:

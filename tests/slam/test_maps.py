@@ -133,18 +133,9 @@ def test_a_file_claims_no_more_than_a_map_can_have(tmp_path):
         ("image: map.pgm", "image: map.yaml", "no image that is read: expected PGM, PNG"),
         ("resolution: 0.05\n", "", "has no resolution"),
         ("resolution: 0.05", "resolution: fine", "resolution must be a number .*, got fine"),
-        ("resolution: 0.05", "resolution: {m: 1}", "resolution must be one value, got fields"),
-        ("resolution: 0.05", "resolution: -1", "resolution must be a number from 0.0001 to 1000"),
-        ("resolution: 0.05", "resolution: 1e-300", "resolution must be a number from 0.0001"),
         ("resolution: 0.05", "resolution: nan", "resolution must be a number from 0.0001"),
         ("origin: [", "origin: [7, ", "origin must be 3 numbers from -1e.08 to 1e.08"),
-        ("origin: [-1.5", "origin: [1e18", "origin must be 3 numbers .*, got .1e18"),
-        ("origin: [-1.5", "origin: [inf", "origin must be 3 numbers .*, got .inf"),
         ("mode: trinary", "mode: rough", "mode must be one of trinary, scale, raw"),
-        ("origin: [", "origin: [[7], ", r"origin must be 3 numbers .*, got \[a list or"),
-        ("negate: 0", "negate 0", "map.yaml:6: is no YAML: .*could not find expected ':'"),
-        ("negate: 0", "negate: maybe", "negate must be 0 or 1, got maybe"),
-        ("negate: 0", "negate: 0\nnegate: 1", "map.yaml:6: no map .* it has 'negate' twice"),
         ("image: map.pgm", 'image: "C:\\map.pgm"', "is no YAML: .* unknown escape"),
         ("negate: 0", "...\n---\nnegate: 0", "is no YAML: expected a single document"),
     ],
@@ -182,14 +173,6 @@ def test_an_unwritable_place_leaves_nothing(tmp_path):
     with pytest.raises(OutputError):
         maps.write_map(tmp_path / "map", small_map())
     assert sorted(p.name for p in tmp_path.iterdir()) == ["file", "map.pgm"]
-
-
-def test_the_picture_tells_unknown_from_known():
-    picture = maps.raster_image(small_map())
-    free, unknown, solid = picture[2, 0], picture[1, 0], picture[0, 0]
-    assert free.min() > 240
-    assert solid.max() < 70
-    assert unknown.max() - unknown.min() < 12
 
 
 def test_a_raster_without_cells_is_no_map(tmp_path):

@@ -133,9 +133,7 @@ def test_a_readers_row_stands_between_the_others_and_no_oracle_runs_again(
     assert "6 of 6 recordings are others here" in " ".join((printed.out + printed.err).split())
 
 
-def test_the_file_is_of_the_folders_alone_and_of_one_commit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_the_file_is_of_the_folders_alone_and_of_one_commit(tmp_path, monkeypatch):
     path, track, commit = tmp_path / "published.json", TRACKS[TRACK], "0123456789abcdef"
     path.write_bytes(runs_file.FILE.read_bytes())
     (tmp_path / TRACK).mkdir()

@@ -79,9 +79,7 @@ def test_which_tracks_count_is_decided_once_and_a_new_version_is_open_again():
     assert ONE.later(counts=True).sha256 == ONE.later().sha256
 
 
-def test_another_world_moves_no_hash_and_runs_no_track_of_this_one(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_another_world_moves_no_hash_and_runs_no_track_of_this_one(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(versions, "WORLD", WORLD + 1)
     test_a_published_track_never_changes()
     says = f"track tour-guide-v1: cannot be made again, it is of world version {ONE.world}, this"

@@ -8,7 +8,7 @@ import pytest
 
 from scripts.days.lifelong import COLUMNS
 from scripts.days.report import operator, summed
-from scripts.days.tables import last_session, printed
+from scripts.days.tables import last_session
 from scripts.days.truth import Spot, Still, ages_of, scored, stands_there, verdicts
 from slam.days.changes import Change
 from slam.tracker.belief.state import State
@@ -56,14 +56,6 @@ def test_a_door_is_one_door_before_and_after():
 
 def row(session, **values):
     return {**dict.fromkeys(COLUMNS), "slam": "s", "session": session, "map": "merged", **values}
-
-
-def test_a_page_says_how_the_last_session_ended():
-    rows = [row(2, found_after_s=12.0, place="right"), row(3, map="m.apart1.npz")]
-    (session, *_) = printed("s", rows, whole=True).columns
-    assert list(session.cells) == ["2", "3"]
-    failed = [row(1, map="anew", place="failed")]
-    assert last_session(failed, "1 thing moved") == "Session 1: 1 thing moved; `s` failed."
 
 
 @pytest.mark.parametrize(

@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ablation: its cells, what is run on which track, and what is refused."""
 
-import json
-
 import pytest
 
 from scripts.benchmark.tracks import TRACKS
@@ -29,20 +27,3 @@ def test_cells_of_tracks_are_geometric_means_and_losses_are_counted():
 def test_only_the_oracle_of_a_track_runs_there():
     slams = ("shunting", "oracle(shunting)", "oracle(shunting,moving)")
     assert [ablation.fitting(slams, TRACKS[name]) for name in TRACKS_OF] == [slams[:2], slams[::2]]
-
-
-def test_a_track_is_a_comparison_that_goes_on(tmp_path, capsys):
-    words = ["--track", "no-walls-v1", "--level", "1", "--slam", "odometry", "--seeds", "1"]
-    words += ["--folder", str(tmp_path / "out"), "--results", str(tmp_path / "r.json")]
-    made = []
-    for _ in range(2):
-        assert ablation.main(words) == 0
-        files = (tmp_path / "out" / "no-walls-v1").rglob("*.npz")
-        made.append(
-            {file.name: file.stat().st_mtime_ns for file in files if "runs" not in file.parts}
-        )
-        assert "World 2, 1 seeds from 720" in capsys.readouterr().out
-    assert made[0]
-    assert made[0] == made[1]
-    (row,) = json.loads((tmp_path / "r.json").read_text())["runs"].values()
-    assert (row["track"], row["level"], row["slam"]) == ("no-walls-v1", 1.0, "odometry")

@@ -57,9 +57,7 @@ def log_at(path: Path, count: int) -> np.ndarray:
     return poses
 
 
-def test_a_log_is_run_in_its_checkout_and_judged(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture
-):
+def test_a_log_is_run_in_its_checkout_and_judged(tmp_path, monkeypatch, capsys):
     poses = log_at(tmp_path / "a.log", 50)
     (tmp_path / "r").write_text("102.25 107.5 " + " ".join(f"{v:.6f}" for v in np.insert(
         se2.between(ROUND.at(2.25)[0], ROUND.at(7.5)[0]), 2, [0.0] * 3)))  # fmt: skip
@@ -123,11 +121,3 @@ def test_nees_is_that_of_its_covariance():
     online = truth + rng.normal(0.0, 0.05, truth.shape)
     covariance = np.tile(np.diag([0.04**2] * 3), (4000, 1, 1))
     assert judging.nees(online, covariance, truth, 0.03) == pytest.approx(1.386, abs=0.08)
-
-
-def test_truth_is_read_at_the_times_of_scans(tmp_path: Path):
-    rows = [f"{t} {0.5 * t} 0 0 0 0 {math.sin(0.05 * t)} {math.cos(0.05 * t)}" for t in range(9)]
-    (tmp_path / "t.tum").write_text("\n".join(rows))
-    poses = judging.truth_of(tmp_path / "t.tum", np.array([-1.0, 2.5, 20.0]))
-    assert np.isnan(poses[[0, 2]]).all()
-    assert poses[1] == pytest.approx([1.25, 0.0, 0.25], abs=1e-2)

@@ -117,24 +117,6 @@ class Faulty(OdometrySlam):
         return replace(estimate, T_map_robot=estimate.T_map_robot + self.by, converged=not late)
 
 
-def test_who_trusts_nothing_is_never_hazardous_and_never_recovers(monkeypatch):
-    monkeypatch.setattr(losses, "create", lambda name: Faulty())
-    row = losses.run(case("crowd"))
-    assert row["drive"]["unavailable"] == 60
-    assert row["drive"]["hazardous"] == row["losses"][0]["hazardous"] == 0
-    assert row["drive"]["outages"] == [math.inf]
-
-
-def test_a_slam_that_fails_leaves_no_loss(monkeypatch):
-    monkeypatch.setattr(losses, "create", lambda name: Faulty())
-    monkeypatch.setattr(Faulty, "fails", True)
-    row = losses.run(case("crowd"))
-    assert "no more" in row["failed"]
-    assert row["losses"] == []
-    found = summary([row])
-    assert (found["failed"], found["losses"], found["scans"]) == (1, 0, 0)
-
-
 def test_a_push_is_undone_or_counted(monkeypatch):
     monkeypatch.setattr(losses, "create", lambda name: Faulty())
     monkeypatch.setattr(losses.kidnap, "AFTER_S", 1.0)

@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from scripts.paper.census import Census
 from scripts.paper.runs import Plan
 from scripts.spec import command
 from scripts.verbs.reproduce import EXPERIMENTS, Reproduce, experiment
@@ -120,18 +119,3 @@ def test_the_graph_is_stamped_by_the_distance_driven(park):
     np.testing.assert_allclose(se2.wrap_array(track.poses[:, 2] - truth[:, 2]), 0.0, atol=0.005)
     again = graph.optimised()
     np.testing.assert_allclose(again.poses, graph.poses, atol=1e-3)
-
-
-def test_census_counts_what_is_missed_spurious_and_deleted():
-    true = np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]])
-    census = Census(true)
-    census.take(true[:2] + 0.1, np.array([3, 4]))
-    census.take(np.array([[0.1, 0.0], [20.0, 0.0], [0.2, 0.0]]), np.array([3, 5, 6]))
-    numbers = census.numbers()
-    assert numbers["misses"] == 2
-    assert numbers["spurious"] == 2
-    assert (numbers["gone"], numbers["deleted by mistake"]) == (1, 1)
-    # the one that was at 5 m is still there, wherever the map has it now
-    census.take(np.array([[0.1, 0.0], [25.0, 0.0]]), np.array([3, 4]))
-    assert census.numbers()["misses"] == 2
-    assert (census.numbers()["gone"], census.numbers()["deleted by mistake"]) == (1, 0)

@@ -102,16 +102,6 @@ def test_tables_show_units_intervals_and_failures(folder: Path):
     ]
 
 
-def test_a_ratio_has_its_interval(folder: Path):
-    rows = {row[0].text: row for row in tables.growth(study(folder), "room").rows}
-    assert [(cell.text, cell.small) for cell in rows["ekf"][3:]] == [
-        ("30.0 ×", "30.0 to 30.0"),
-        ("0 of 6", "0 to 39 %"),
-        ("0 of 6", "0 to 39 %"),
-    ]
-    assert rows[made.OWN][3].text == "∞ ×"
-
-
 def kept(folder: Path, keep) -> None:
     """Rewrite the tables of a comparison with some of its rows alone."""
     rows = [row for row in files.read(folder).runs if keep(row)]
@@ -120,27 +110,6 @@ def kept(folder: Path, keep) -> None:
     recipe["settings"]["slams"] = list(dict.fromkeys(row["slam"] for row in rows))
     recipe["settings"]["levels"] = sorted({row["dynamism"] for row in rows})
     (folder / "recipe.json").write_text(json.dumps(recipe))
-
-
-@pytest.mark.parametrize(
-    ("keep", "head", "first"),
-    [
-        (lambda row: row["slam"] == "ekf", ["dynamism"], ["0", "1"]),
-        (lambda row: row["dynamism"] == 1.0, ["SLAM"], [made.OURS, "ekf", made.OWN]),
-    ],
-)
-def test_tables_of_one_column_or_row_are_one_table(tmp_path: Path, keep, head, first):
-    folder = made.make(tmp_path / "compare")
-    kept(folder, keep)
-    one = study(folder)
-    shown = [METRICS[key] for key in ("rpe_m_per_m", "lost", "ate_unaligned_m")]
-    (table,) = tables.of_levels(one, "room", shown)
-    assert table.head == [head[0], *(metric.heading for metric in shown)]
-    assert [row[0].text for row in table.rows] == first
-    assert len(tables.of_outcomes(one)) == 1
-    if one.rivals:
-        (table,) = tables.of_pairs(one, "room", shown)
-        assert [row[0].text for row in table.rows] == one.rivals
 
 
 def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path):

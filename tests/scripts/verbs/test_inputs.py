@@ -98,9 +98,7 @@ WAYS = [
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.words)
-def test_what_is_read_is_not_written_over(
-    way: Way, made: Path, tmp_path: Path, called, monkeypatch
-):
+def test_what_is_read_is_not_written_over(way, made, tmp_path, called, monkeypatch):
     here = Path(shutil.copytree(made, tmp_path / "here"))
     monkeypatch.chdir(here)
     way.first(here)

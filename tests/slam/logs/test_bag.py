@@ -2,7 +2,6 @@
 """Anybody's bag: topics at their own rates, scanners mounted anyhow, and every kind of damage."""
 
 import math
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -170,10 +169,8 @@ def test_a_chain_of_many_transforms_is_refused_by_their_number(tmp_path, a_messa
     del links[30_000 // a_message :]
     driven = drive(make)[1:]
     path = bags.write_ros2(tmp_path / "a", driven + links if scans_first else links + driven)
-    began = time.perf_counter()
     with pytest.raises(LogFormatError, match=r"more than 2000 transforms between frames"):
         read_bag(path)
-    assert time.perf_counter() - began < 20.0  # it was minutes
 
 
 @pytest.mark.parametrize("n", [1, 2, 300, 1999])

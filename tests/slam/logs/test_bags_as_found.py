@@ -169,24 +169,6 @@ def test_what_sqlite_left_in_its_log_is_read_and_nothing_is_written(tmp_path, dr
     assert {p.name: p.read_bytes() for p in path.iterdir()} == before
 
 
-@pytest.mark.parametrize(
-    ("old", "new"),
-    [
-        ("offered_qos_profiles: []", "offered_qos_profiles: [{history: best, depth: x}]"),
-        ("type_description_hash: ", "type_description_hash: RIHS01_0"),
-        ("offered_qos_profiles: []", "offered_qos_profiles: '- history: 3'"),
-        ("version: 9", "version: 12"),
-        ("rosbag2_bagfile_information", "}{"),
-    ],
-)
-def test_metadata_never_hides_messages(tmp_path, driven, old, new):
-    path = bags.write_ros2(tmp_path / "a", recorded(driven))
-    text = (path / "metadata.yaml").read_text()
-    assert old in text
-    (path / "metadata.yaml").write_text(text.replace(old, new))
-    assert len(poses_of(path, strict=True)) == SCANS
-
-
 def test_files_of_a_bag_are_read_in_the_order_of_their_numbers(tmp_path, driven):
     messages = recorded(driven)
     for number in (2, 10):
@@ -290,12 +272,6 @@ def test_metadata_whose_keys_merge_without_end_is_none(tmp_path, driven):
     lines += [f"a{k}: &a{k} {{<<: [{', '.join([f'*a{k - 1}'] * 10)}]}}" for k in range(1, 12)]
     (bag / "metadata.yaml").write_text("\n".join(lines))
     assert len(list(read_bag(bag))) == 5
-
-
-def test_odometry_that_is_no_number_is_not_one_that_stands_still(tmp_path, driven):
-    rows = recorded(driven, odometry=lambda k, pose: (math.nan, 0.0, 0.0))
-    with pytest.raises(LogFormatError, match=r"topic /odom, message 1: pose\.position"):
-        list(read_bag(bags.write_ros2(tmp_path / "a", rows)))
 
 
 def test_a_chunk_in_a_chunk_is_refused(tmp_path):

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 import slam
 from slam import se2
 from slam._jit import COMPILING
-from slam.errors import InvalidValueError
-from slam.frames import Frame, Odometry, Scan
+from slam.frames import Frame, Scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from tests.world2d import Chairs, Drive, World2D, arena, frames, going_on, laser, rectangle, wander
 
@@ -164,19 +163,6 @@ def test_the_map_shows_the_walls_once() -> None:
     assert (to_wall[~pillar] < 0.08).mean() > 0.99
 
 
-def test_wrong_input_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match="'robust' or 'paper'"):
-        ShuntingSlam("fast")
-    stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(31))[:2]
-    system = ShuntingSlam(FAST)
-    system.update(stream[1])
-    with pytest.raises(InvalidValueError, match="order"):
-        system.update(stream[0])
-    bare = Frame(stamp_ns=10**10, odometry=Odometry(stamp_ns=10**10, T_odom_robot=np.zeros(3)))
-    with pytest.raises(InvalidValueError, match="scan or features"):
-        system.update(bare)
-
-
 def test_no_frame_waits_for_the_compiler() -> None:
     """After construction nothing is compiled, not for a wide search either."""
     compiled: list[str] = []
@@ -206,15 +192,3 @@ def test_no_frame_waits_for_the_compiler() -> None:
         event.unregister(COMPILING, listener)
     assert searched
     assert compiled == []
-
-
-def test_the_ordinary_grid_drives_too_and_remembers_what_is_free() -> None:
-    stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(181), seed=8)[:60]
-    system = slam.create("occupancy", cell_m=0.05)
-    assert rms(errors(system, stream)[:, :2]) < 0.05
-    raster = system.map()
-    assert raster is not None
-    column = round((1.0 - raster.T_map_origin[0]) / raster.resolution_m)
-    row = round(-raster.T_map_origin[1] / raster.resolution_m)
-    assert raster.values[row, column] < 0.1  # 1 m ahead of the start
-    assert np.nanmax(raster.values) > 0.9

@@ -84,9 +84,7 @@ def test_the_first_answer_is_the_best_of_all_in_a_window(slam: ShuntingSlam) -> 
 
 
 @pytest.mark.parametrize("blocks", [1 << 20, 1])  # bounded by blocks of 8 x 8, or 64 x 64, cells
-def test_over_many_scans_the_answers_are_those_of_one_search(
-    slam: ShuntingSlam, blocks: int, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_over_many_scans_the_answers_are_those_of_one_search(slam, blocks, monkeypatch):
     monkeypatch.setattr(coarse_map, "MOST_BLOCKS", blocks)
     for k in range(0, 90, 15):
         _, at_once, _ = searched(slam, k, 100.0)
