@@ -4,7 +4,6 @@
 import math
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -19,6 +18,7 @@ from sim.world.robots import FOLDER
 from slam import se2
 from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Raster
+from tests.built_scenes import model_bytes
 
 CELL = 0.05
 WIDE, HIGH, GAP = 12.0, 8.0, 1.0
@@ -181,14 +181,6 @@ def test_a_start_that_rooms_of_a_turned_map_leave_out_has_its_own(tmp_path):
     assert scenes.build(str(write(made, tmp_path / "lab")), 1).start[:2] == pytest.approx(
         (x, y), abs=1e-3
     )
-
-
-def model_bytes(scene: scenes.Scene) -> bytes:
-    """The compiled model."""
-    model = scene.compile()
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
 
 
 SIDE = 1000  # px of the pictures that are no maps

@@ -105,7 +105,6 @@ def test_a_cache_that_names_types_which_are_gone_is_an_empty_cache(tmp_path):
 
 DAMAGED = """
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -133,7 +132,7 @@ assert sum(called().cache_misses.values()) == 1
 whole = files()
 assert len(whole) == 2
 assert sum(called().cache_hits.values()) == 1
-rng = np.random.default_rng(int(sys.argv[1]))
+rng = np.random.default_rng(0)
 for k in range(110):
     path = list(whole)[k % 2]
     data = bytearray(whole[path])
@@ -155,11 +154,10 @@ print("survived")
 """
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_damaged_entry_of_the_cache_is_made_again(tmp_path, seed):
+def test_a_damaged_entry_of_the_cache_is_made_again(tmp_path):
     """A torn file of a power cut, a flipped bit: the code in it would end the process."""
     (tmp_path / "damaged.py").write_text(DAMAGED)
-    done = python(tmp_path / "damaged.py", seed, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    done = python(tmp_path / "damaged.py", NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     assert (done.returncode, done.stdout, done.stderr) == (0, "survived\n", "")
 
 

@@ -18,14 +18,6 @@ def test_the_seed_and_only_the_seed_decides_a_stream():
         assert not np.array_equal(same, other)
 
 
-def test_overriding_one_stream_leaves_the_others():
-    plain, changed = Seeds(3), Seeds(3, lidar=7)
-    for name in STREAMS:
-        equal = np.array_equal(plain.counters(name, 5), changed.counters(name, 5))
-        assert equal == (name != "lidar")
-    np.testing.assert_array_equal(changed.counters("lidar", 5), Seeds(7).counters("lidar", 5))
-
-
 def test_the_first_counters_do_not_depend_on_how_many_there_are():
     np.testing.assert_array_equal(
         Seeds(3).counters("chairs", 4), Seeds(3).counters("chairs", 9)[:4]

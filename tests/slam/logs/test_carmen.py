@@ -12,7 +12,6 @@ from slam import Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata, se2
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import to_ns
 from slam.logs import open_log, read_carmen, write_carmen
-from slam.logs.repairs import Repairs, put_in_order
 
 
 def read(tmp_path, text, name="a.log"):
@@ -152,16 +151,6 @@ def test_of_several_scan_messages_one_is_read_and_the_others_counted(tmp_path, c
     stream = read(tmp_path, "".join(lines))
     assert stream.length == 3
     assert stream.metadata.extra["ignored"] == {"RAWLASER1": 3}
-
-
-def test_equal_stamps_are_spread_to_the_next_later_one(tmp_path):
-    lines = list(range(7))
-    ordered = put_in_order(tmp_path, [100, 100, 100, 100, 500, 900, 900], lines)
-    assert ordered.stamps_ns == [100, 200, 300, 400, 500, 900, 1300]
-    crowded = put_in_order(tmp_path, [5, 5, 5, 6, 6], range(5)).stamps_ns
-    assert all(b > a for a, b in pairwise(crowded))
-    with pytest.raises(LogFormatError, match="199 scans have the time of another"):
-        put_in_order(tmp_path, [0] * 200, range(200), repairs=Repairs(tmp_path, strict=True))
 
 
 def test_ranges_at_the_maximum_are_no_return_and_zero_is_an_error_code(tmp_path, carmen_text):
