@@ -15,7 +15,6 @@ from typer.testing import CliRunner
 
 from scripts.cli import app
 from scripts.site.check import faults, main
-from scripts.site.columns import as_markdown
 
 pytestmark = pytest.mark.docs
 REPO = Path(__file__).resolve().parents[1]
@@ -127,9 +126,7 @@ def test_the_policy_blocks_run(block: int, capsys: pytest.CaptureFixture[str]):
     assert block or f"It prints `{printed}`" in (DOCS / "jobs/my_policy.md").read_text()
 
 
-def test_the_dataset_blocks_run(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch, capsys: pytest.CaptureFixture[str]
-):
+def test_the_dataset_blocks_run(tmp_path, monkeypatch, capsys):
     """On shorter episodes, where the extra ``data`` is."""
     pytest.importorskip("minari")
     monkeypatch.chdir(tmp_path)
@@ -142,23 +139,3 @@ def test_the_dataset_blocks_run(
         assert done.exit_code == 0, done.output
         exec(code, {})
         assert ", 361)" in capsys.readouterr().out
-
-
-def test_columns_of_a_docstring_become_a_list():
-    text = """A camera.
-
-    with Camera() as camera:
-        camera.render()
-
-width, height  px
-shadows        of the sun;
-               half the cost
-
-Raises an error. It has  two blanks, and stays.
-For example
-    camera.close()"""
-    assert as_markdown(text).splitlines() == [
-        "A camera.", "", "    with Camera() as camera:", "        camera.render()", "",
-        "- `width`, `height`: px", "- `shadows`: of the sun; half the cost", "",
-        "Raises an error. It has  two blanks, and stays.", "For example", "", "    camera.close()",
-    ]  # fmt: skip

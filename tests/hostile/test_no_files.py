@@ -15,8 +15,7 @@ from sim.recording.episode import record
 from sim.recording.recipe import Recipe, read_recipe
 from sim.recording.sums import SUMS, check_vouched, write_sums
 from sim.recording.verify import check_hashes
-from sim.simulation import n_frames
-from slam.errors import InvalidValueError, LogFormatError
+from slam.errors import LogFormatError
 from slam.logs.bag_topics import Bag
 
 pytestmark = pytest.mark.fuzz
@@ -81,9 +80,3 @@ def test_a_nested_list_hides_nothing_of_an_episode(where: str, tmp_path: Path):
     assert check_hashes(episode).ok
     nested(episode / where)
     assert check_hashes(episode).verdict == "foreign"
-
-
-@pytest.mark.parametrize("seconds", [1e308, 1e30])
-def test_seconds_that_no_simulation_can_have_are_refused(seconds: float):
-    with pytest.raises(InvalidValueError, match="seconds must be at most"):
-        n_frames(seconds, 1.0 / 37.5)

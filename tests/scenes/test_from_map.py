@@ -2,11 +2,8 @@
 """From a map to a plan: walls, gaps, things and floor are where the map has them."""
 
 import math
-import struct
-import zlib
 from dataclasses import replace
 
-import mujoco
 import numpy as np
 import pytest
 
@@ -14,14 +11,14 @@ import scenes
 from scenes.from_map import FromMap, plan, write
 from scenes.placement import gap_to_boxes
 from scripts.scene.check import problems
-from scripts.scene.make import of_file
 from scripts.scene.robot import robot_of
 from sim.driving.pilot import tour_of
 from sim.simulation import Simulation
 from sim.world.robots import FOLDER
 from slam import se2
-from slam.errors import InvalidValueError, LogFormatError, MobiliaError
+from slam.errors import InvalidValueError, MobiliaError
 from slam.estimate import Raster
+from tests.built_scenes import model_bytes
 
 CELL = 0.05
 WIDE, HIGH, GAP = 12.0, 8.0, 1.0
@@ -158,14 +155,6 @@ def test_what_is_no_robot_is_refused(words, said):
         robot_of(words)
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_noise_is_refused(seed):
-    noise = np.random.default_rng(seed).integers(0, 2, (120, 120)).astype(np.float32)
-    raster = Raster(values=noise, resolution_m=CELL, T_map_origin=np.zeros(3))
-    with pytest.raises(InvalidValueError, match=r"noise\.yaml: .* floor"):
-        plan(raster, source="noise.yaml")
-
-
 def test_the_files_are_a_scene_and_each_part_can_be_switched_off(tmp_path):
     file = write(plan(two_rooms()), tmp_path / "lab")
     name = str(file)
@@ -192,14 +181,6 @@ def test_a_start_that_rooms_of_a_turned_map_leave_out_has_its_own(tmp_path):
     assert scenes.build(str(write(made, tmp_path / "lab")), 1).start[:2] == pytest.approx(
         (x, y), abs=1e-3
     )
-
-
-def model_bytes(scene: scenes.Scene) -> bytes:
-    """The compiled model."""
-    model = scene.compile()
-    buffer = np.empty(mujoco.mj_sizeModel(model), np.uint8)
-    mujoco.mj_saveModel(model, None, buffer)
-    return buffer.tobytes()
 
 
 SIDE = 1000  # px of the pictures that are no maps
@@ -234,18 +215,3 @@ def test_a_map_that_no_scene_has_room_for_is_refused(origin, cell, says):
     raster = replace(two_rooms(), resolution_m=cell, T_map_origin=np.array(origin))
     with pytest.raises(InvalidValueError, match=rf"map: .*{says}|map {says}"):
         plan(raster, FromMap(things=False))
-
-
-def test_a_picture_of_too_many_pixels_is_not_unpacked(tmp_path):
-    size = struct.pack(">2I5B", 13000, 13000, 8, 0, 0, 0, 0)
-    parts = [
-        struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
-        for kind, data in ((b"IHDR", size), (b"IDAT", b""))
-    ]
-    (tmp_path / "a.png").write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(parts))
-    (tmp_path / "a.yaml").write_text(
-        "image: a.png\nresolution: 0.05\norigin: [0, 0, 0]\noccupied_thresh: 0.65\n"
-        "free_thresh: 0.2\n"
-    )
-    with pytest.raises(LogFormatError, match=r"a\.png: 13000 x 13000 pixels, at most 36000000"):
-        of_file(tmp_path / "a.yaml")

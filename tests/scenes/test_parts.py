@@ -9,7 +9,6 @@ import numpy as np
 import pytest
 
 import scenes.assembly
-from scenes import look
 from scenes.kinds import KINDS
 from scenes.placement import Floor, gap_to_boxes
 from tests.built_scenes import placed
@@ -92,17 +91,6 @@ def test_a_laser_meets_a_board_over_its_whole_length_and_a_bed_at_ends_and_colum
     ]
     assert met == [True, False, True, False, True, True]
     assert seen_across("couch", 0.0) == pytest.approx(0.36)
-
-
-@pytest.mark.parametrize("material", sorted(look.PAINTERS))
-def test_a_floor_tile_wraps_round_without_a_seam(material):
-    data, n, size_m = look.floor(material)
-    image = np.frombuffer(data, np.uint8).reshape(n, n, 3).astype(float)
-    assert size_m > 0
-    assert image.std() > 1.0
-    for axis in (0, 1):
-        steps = np.abs(image - np.roll(image, 1, axis=axis)).mean(axis=(1 - axis, 2))
-        assert steps[0] <= 1.2 * steps[1:].max()  # no step at the rim that is not inside too
 
 
 def test_the_gap_to_a_turned_box_is_euclidean():

@@ -10,7 +10,6 @@ import pytest
 
 import scenes
 from scenes.scene import FOOT, LASER, Scene
-from sim.gym.env import MobiliaEnv
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.simulation import Simulation
 from sim.world.world import World
@@ -148,13 +147,3 @@ def test_the_height_is_said_in_recordings_and_kept_in_states():
     assert low.metadata().extra["scan_height_m"] == 0.15
     with pytest.raises(InvalidValueError, match="scan_height_m"):
         usual.load_state(low.save_state())
-
-
-def test_an_environment_takes_it_for_good_or_for_an_episode():
-    env = MobiliaEnv("arena", scan_height_m=0.46, laser=Lms221Config.ideal())
-    env.reset(seed=0)
-    assert env.simulation.world.scene.scan_height_m == 0.46
-    env.reset(seed=0, options={"scan_height_m": 0.15})
-    assert env.simulation.world.scene.scan_height_m == 0.15
-    with pytest.raises(InvalidValueError, match="scan_height_m"):
-        env.reset(seed=0, options={"scan_height_m": 3.0})

@@ -48,15 +48,6 @@ def test_a_quick_step_is_one_line_and_an_unseen_one_none(printed: io.StringIO):
     assert printed.getvalue() == "seen: done, 0 s\n"
 
 
-def test_what_counts_nothing_tells_too(printed: io.StringIO):
-    with console.working("measuring [3 rows]"):
-        wait_for(printed, "measuring [3 rows]: 0 s so far\n")
-    told = printed.getvalue()
-    with console.working("quick"):
-        pass
-    assert printed.getvalue() == told
-
-
 def test_the_time_left_of_few_long_steps_is_that_of_all_so_far():
     bar = Progress(get_time=lambda: now)
     now = 0.0
@@ -65,18 +56,6 @@ def test_the_time_left_of_few_long_steps_is_that_of_all_so_far():
     bar.advance(task, 2)  # two that ended together
     now = 150.0
     assert console._words(bar.tasks[0]) == "simulating: 150 s so far, about 5 min left"
-
-
-def test_what_was_there_before_is_not_of_the_pace():
-    bar = Progress(get_time=lambda: now)
-    now = 0.0
-    bar.add_task("simulating", total=1000, completed=900, before=900)
-    now = 50.0
-    bar.advance(bar.task_ids[0], 50)
-    assert console._words(bar.tasks[0]) == "simulating: 50 s so far, about 50 s left"
-    assert [console.in_time(s) for s in (7.4, 52.0, 250.0, 9000.0)] == [
-        "7 s", "50 s", "4 min", "2.5 h",
-    ]  # fmt: skip
 
 
 @pytest.mark.parametrize("say", [console.note, console.fact])

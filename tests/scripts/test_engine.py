@@ -13,7 +13,7 @@ import pytest
 
 from scripts.engine import Stage, Study, carry_out
 from scripts.jobs import Job
-from slam.errors import InvalidValueError, OutputError, SlamFailedError, UnknownNameError
+from slam.errors import InvalidValueError, SlamFailedError, UnknownNameError
 from slam.files import write_text
 
 REPO = Path(__file__).resolve().parents[2]
@@ -103,12 +103,6 @@ def test_wrong_names_are_told_before_anything_starts(tmp_path, wrong):
     with pytest.raises((UnknownNameError, InvalidValueError, SlamFailedError)):
         carry_out(study(**wrong), tmp_path / "out")
     assert not (tmp_path / "out").exists()
-
-
-def test_somebody_elses_folder_is_refused(tmp_path):
-    (tmp_path / "letter.txt").write_text("dear")
-    with pytest.raises(OutputError, match="choose another"):
-        carry_out(study(), tmp_path)
 
 
 def test_killed_it_goes_on(tmp_path):

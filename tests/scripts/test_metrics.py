@@ -2,7 +2,6 @@
 """One row a metric: every command takes it from the table, and nobody keeps a list of his own."""
 
 import math
-from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -63,18 +62,6 @@ def test_run_and_compare_compute_the_same_figures(run):
 def test_without_truth_only_what_needs_none_is_there(run):
     block = scores(run[0], None, duration_s=8.0)
     assert set(block) == {"scans"} | {m.in_run for m in table.IN_RUN if m.without_truth}
-
-
-def test_a_new_row_is_computed_for_every_command(run, monkeypatch):
-    new = replace(METRICS["end_error_m"], key="largest_m", in_run="largest_m",
-                  compute=lambda judged: float(judged.pairs.distances.max()))  # fmt: skip
-    monkeypatch.setitem(METRICS, new.key, new)
-    monkeypatch.setattr(table, "COLUMNS", (*table.COLUMNS, new.key))
-    monkeypatch.setattr("scripts.single_run.score.IN_RUN", (*table.IN_RUN, new))
-    track, truth = run
-    row = scored(track, None, None, truth)
-    assert row["largest_m"] == scores(track, truth, duration_s=8.0)["largest_m"]
-    assert row["largest_m"] >= row["end_error_m"] > 0.0
 
 
 def judged(errors_m, *, sigma_m: float = 0.01, trusted=None, leap_at: int | None = None) -> Judged:

@@ -10,10 +10,8 @@ import numpy as np
 import pytest
 from typer.testing import CliRunner
 
-import sim
 from scripts.cli import app
 from scripts.closed_loop.plan import DrivePlan
-from scripts.closed_loop.runs import load
 from scripts.comparison import schema
 from scripts.comparison.make import carry_out
 from scripts.comparison.plan import Plan
@@ -23,7 +21,6 @@ from scripts.options import Axis, Levels, Moves, every_of
 from scripts.report.study import study
 from scripts.results import check
 from sim.core.dynamism import Dynamism
-from sim.loop import LoopConfig
 from sim.recording.recipe import RECIPE, Recipe, read_recipe, write_recipe
 from sim.sensors.lidar.registry import scanner_of
 from sim.twins.absence import Change
@@ -54,14 +51,6 @@ def test_the_hash_of_a_recipe_without_them_is_that_of_before():
     assert Recipe(**ONE).sha256 == (
         "287bae2f8fbe7d178715e9469eb2f37139bf1622d64fcdbba97099354fadaf2c"
     )
-
-
-def test_a_crowd_is_an_option_of_the_scene_and_checked():
-    recipe = Recipe(**ONE, options={"crowd": "escorts:3"})
-    assert recipe.simulation()["crowd"] == "escorts:3"
-    for wrong in ("escorts", "dragons:3", "escorts:3,escorts:4", 7):
-        with pytest.raises(InvalidValueError, match="crowd must be"):
-            Recipe(**ONE, options={"crowd": wrong})
 
 
 def test_the_axis_is_what_has_several_levels():
@@ -146,28 +135,6 @@ def test_a_title_says_what_was_given():
     assert title_of(more) == "arena · dynamism 0.5 · motion 0.2 · crowd boards:1 · seed 4"
 
 
-def test_an_environment_has_the_knobs_and_a_reset_may_replace_them():
-    env = gymnasium.make(
-        "mobilia/Arena-v2", disable_env_checker=True, motion=0.0, change=0.25, crowd="escorts:2"
-    ).unwrapped
-    space = env.observation_space
-    env.reset(seed=1)
-    world = env.simulation.world
-    assert (world.rates.crowd, world.rates.change) == (0.0, 0.25)
-    assert "escort1" in world.mover_names
-    env.reset(seed=1, options={"crowd": "none", "motion": 0.5, "change": 0.0})
-    world = env.simulation.world
-    assert (world.rates.crowd, world.rates.change) == (0.5, 0.0)
-    assert "escort0" not in world.mover_names
-    assert env.observation_space == space
-    for name, value in (("crowd", "dragons:2"), ("motion", 2.0), ("change", "much")):
-        with pytest.raises(InvalidValueError, match=name):
-            env.reset(options={name: value})
-        with pytest.raises(InvalidValueError, match=name):
-            gymnasium.make("mobilia/Arena-v2", disable_env_checker=True, **{name: value})
-    assert sim is not None
-
-
 def test_a_run_keeps_its_scanner_in_the_recipe_and_is_filmed_with_it(tmp_path: Path) -> None:
     out = tmp_path / "run"
     words = ["run", "odometry", "--scene", "arena", "--seconds", "1", "--no-film"]
@@ -184,17 +151,6 @@ def test_slams_get_about_as_many_scans_a_second_of_each() -> None:
     names = ("full", "utm30lx", "tim561", "rplidar_a1")
     assert [every_of(name, None, 8) for name in names] == [8, 9, 3, 1]
     assert every_of("utm30lx", 2, 8) == 2
-
-
-def test_a_closed_loop_drives_with_any_scanner(tmp_path: Path) -> None:
-    plan = DrivePlan(
-        scene="arena", slams=("odometry",), levels=(0.0,), seeds=(100,), goals=1,
-        loop=LoopConfig(scans=1, limit_s=1.0), scanner="rplidar_a1:noise",
-    )  # fmt: skip
-    ((identity, job),) = plan.jobs()
-    job.call(tmp_path / "run.npz", **job.arguments)
-    stamps = load(tmp_path / "run.npz", identity).arrays["stamps_ns"]
-    assert np.diff(stamps).min() >= 181_818_181
 
 
 @pytest.mark.parametrize("laser", ["utm30lx:noise", "rplidar_a1"])

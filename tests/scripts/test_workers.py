@@ -14,7 +14,7 @@ import pytest
 from scripts import workers
 from scripts.jobs import Job, run_jobs
 from slam import locks
-from slam.errors import MobiliaError, OutputError
+from slam.errors import MobiliaError
 from slam.guests.wire import Wire
 from tests.processes import processes_with, python
 
@@ -91,17 +91,6 @@ def test_a_killed_worker_is_one_line(tmp_path):
     with pytest.raises(MobiliaError, match=r"a worker process was killed, .* goes on from here"):
         run_jobs(some_jobs(guest=False), tmp_path, processes=2)
     killer.join()
-
-
-def test_a_folder_that_a_left_worker_writes_is_not_taken_up(tmp_path, monkeypatch):
-    monkeypatch.setattr(locks, "WAIT_S", 0.1)
-    with locks.locked(tmp_path):
-        left = locks.working(tmp_path, locks.ticket(tmp_path))
-        left.__enter__()
-    with pytest.raises(OutputError, match="still being written by workers"):
-        run_jobs(some_jobs(quick), tmp_path, processes=2)
-    left.__exit__(None, None, None)
-    assert len(run_jobs(some_jobs(quick), tmp_path, processes=2)) == 2
 
 
 def holds(folder: Path) -> bool:

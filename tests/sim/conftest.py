@@ -9,8 +9,6 @@ import numpy as np
 import pytest
 
 SCAN_HEIGHT = 0.36
-LASER_X = 0.02
-
 ROBOT = """
 <mujoco>
   <compiler angle="radian"/>

@@ -10,9 +10,9 @@ import pytest
 
 from sim.core.seeds import Seeds
 from sim.moments import Moment, thinned
-from sim.simulation import Simulation, stream, tour
+from sim.simulation import Simulation, tour
 from slam.errors import InvalidValueError, UnknownNameError
-from slam.frames import BeamClass, Frame, Odometry
+from slam.frames import Frame, Odometry
 
 pytestmark = pytest.mark.slow
 DIGEST = """
@@ -52,26 +52,6 @@ def test_two_processes_agree_on_every_byte_and_another_seed_does_not(here):
     first = here(DIGEST, "5")
     assert first == elsewhere(DIGEST, "5")
     assert first != here(DIGEST, "6")
-
-
-def test_a_stream_replays_from_the_start():
-    frames = stream("arena", seed=2, seconds=1.0)
-    once, twice = list(frames), list(frames)
-    assert len(once) == frames.length
-    for a, b in zip(once, twice, strict=True):
-        np.testing.assert_array_equal(a.scan.ranges, b.scan.ranges)
-        np.testing.assert_array_equal(a.truth, b.truth)
-
-
-def test_labels_tell_static_resting_and_moving_things_apart():
-    simulation = Simulation("office", seed=1, dynamism=1.0, labels=True)
-    kinds = np.concatenate([f.labels.kind for f in tour(simulation, 4.0)])
-    for kind in (BeamClass.STATIC, BeamClass.SEMI_STATIC, BeamClass.MOVING):
-        assert (kinds == kind).any()
-    frozen = Simulation("office", seed=1, dynamism=0.0, labels=True)
-    labels = [frozen.observe().labels for _ in range(3)]
-    assert not any((label.kind == BeamClass.MOVING).any() for label in labels)
-    assert all((label.displacement == 0.0).all() for label in labels)
 
 
 def test_wrong_settings_are_refused_by_name():

@@ -88,11 +88,6 @@ def test_a_missing_file_a_folder_and_a_pipe_are_refused(tmp_path: Path) -> None:
             read_arrays(path)
 
 
-def test_a_missing_name_is_refused(file: Path) -> None:
-    with pytest.raises(LogFormatError, match="'absent'"):
-        read_arrays(file, ["poses", "absent"])
-
-
 def test_a_bomb_is_refused_before_it_is_unpacked(tmp_path: Path) -> None:
     path = tmp_path / "bomb.npz"
     np.savez_compressed(path, zeros=np.zeros(50_000_000, np.uint8), small=np.ones(3))

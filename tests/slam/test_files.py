@@ -82,17 +82,6 @@ def test_places_that_cannot_be_written(tmp_path):
     assert tree(tmp_path) == ["file", "folder"]
 
 
-def test_a_disk_error_inside_is_named_once(tmp_path):
-    with (
-        pytest.raises(OutputError) as caught,
-        replacing(tmp_path / "a"),
-        replacing(tmp_path / "b"),
-    ):
-        raise OSError(28, "No space left on device")
-    assert str(caught.value) == f"cannot write {tmp_path / 'b'}: No space left on device"
-    assert tree(tmp_path) == []
-
-
 def test_what_a_killed_run_left_is_removed_and_what_is_being_written_is_not(tmp_path):
     path = tmp_path / "a.txt"
     for name in (".a.17.part.txt", ".a.txt.17.part", ".ab.17.part.txt", ".a.x.17.part.txt"):

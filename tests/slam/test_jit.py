@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The compile cache notices a change in a kernel of another module; compiling is said once."""
 
-import gc
 import hashlib
 import logging
 import os
@@ -13,9 +12,8 @@ from pathlib import Path
 import numba
 import numpy as np
 import pytest
-from numba.core import event
 
-from slam._jit import COMPILING, announced, inner, uncounted
+from slam._jit import announced, inner, uncounted
 from tests.processes import python
 
 pytestmark = pytest.mark.slow
@@ -107,7 +105,6 @@ def test_a_cache_that_names_types_which_are_gone_is_an_empty_cache(tmp_path):
 
 DAMAGED = """
 import os
-import sys
 from pathlib import Path
 
 import numpy as np
@@ -135,7 +132,7 @@ assert sum(called().cache_misses.values()) == 1
 whole = files()
 assert len(whole) == 2
 assert sum(called().cache_hits.values()) == 1
-rng = np.random.default_rng(int(sys.argv[1]))
+rng = np.random.default_rng(0)
 for k in range(110):
     path = list(whole)[k % 2]
     data = bytearray(whole[path])
@@ -157,11 +154,10 @@ print("survived")
 """
 
 
-@pytest.mark.parametrize("seed", [0, 1])
-def test_a_damaged_entry_of_the_cache_is_made_again(tmp_path, seed):
+def test_a_damaged_entry_of_the_cache_is_made_again(tmp_path):
     """A torn file of a power cut, a flipped bit: the code in it would end the process."""
     (tmp_path / "damaged.py").write_text(DAMAGED)
-    done = python(tmp_path / "damaged.py", seed, NUMBA_CACHE_DIR=str(tmp_path / "cache"))
+    done = python(tmp_path / "damaged.py", NUMBA_CACHE_DIR=str(tmp_path / "cache"))
     assert (done.returncode, done.stdout, done.stderr) == (0, "survived\n", "")
 
 
@@ -192,30 +188,6 @@ def test_compiling_is_said_once_and_a_run_without_it_not(caplog: pytest.LogCaptu
         with announced("the test's kernel", 2.0):
             twice(3)
         assert len(caplog.records) == 1
-
-
-@pytest.mark.parametrize("collected", [False, True])
-def test_the_collector_rests_while_a_kernel_compiles_and_is_left_as_it_was(collected: bool) -> None:
-    resting = []
-
-    class Look(event.Listener):
-        def on_start(self, event: object) -> None:
-            resting.append(not gc.isenabled())
-
-        def on_end(self, event: object) -> None: ...
-
-    was = gc.isenabled()
-    (gc.enable if collected else gc.disable)()
-    try:
-        with event.install_listener(COMPILING, Look()):
-            assert numba.njit(lambda x: x + 1)(1) == 2
-            with pytest.raises(numba.core.errors.TypingError):
-                numba.njit(lambda x: x.nothing)(1)
-        assert resting
-        assert all(resting)
-        assert gc.isenabled() is collected
-    finally:
-        (gc.enable if was else gc.disable)()
 
 
 def test_an_implementation_that_fitted_other_types_is_not_taken_for_these() -> None:

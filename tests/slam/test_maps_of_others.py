@@ -22,10 +22,8 @@ FIELDS = {
 }  # fmt: skip
 WRITTEN = {
     "block list": BARE + "origin:\n- -5.0\n- -4.0\n- 0.25\n",
-    "indented block list": BARE + "origin:\n    - -5.0\n    - -4.0\n    - 2.5e-1\n",
     "list over lines": BARE + "origin: [-5.0,\n  -4.0, 0.25]\n",
     "list in quotes": BARE + 'origin: "[-5, -4, 0.25]"\n',
-    "other lists": BARE + ORIGIN + "layers:\n- a\n- {name: b, file: [c, d]}\n",
     "quoted keys": BARE.replace("resolution", '"resolution"')
     + ORIGIN.replace("origin", "'origin'"),
     "JSON": json.dumps(FIELDS),
@@ -75,9 +73,6 @@ HOSTILE = {
     "no such letter": 'image: "\\UFFFFFFFF"\n',
     "many digits": BARE + "origin: [" + "9" * 60_000 + ", 0, 0]\n",
     "a control character": "image: a\x07\n",
-    "a list": "- image\n- resolution\n",
-    "a word": "map",
-    "nothing": "# nothing\n",
 }
 
 
@@ -139,9 +134,7 @@ IMAGES = {
     "c.pgm": lambda path: path.write_bytes(b"P5 4 2 255 " + GRAYS.tobytes()),
     "d.ppm": lambda path: Image.fromarray(GRAYS).convert("RGB").save(path),
     "e.bmp": lambda path: Image.fromarray(GRAYS).save(path),
-    "f.bmp": lambda path: Image.fromarray(GRAYS).convert("RGB").save(path),
     "g.tiff": lambda path: Image.fromarray(GRAYS).save(path),
-    "h.tif": lambda path: Image.fromarray(GRAYS).save(path, compression="tiff_lzw"),
     "i.tif": lambda path: Image.fromarray(wide(GRAYS)).save(path),
     "j.tif": tiff_of_16_bits_whose_0_is_white,
     "k.png": lambda path: Image.fromarray(wide(GRAYS)).save(path),

@@ -184,8 +184,6 @@ def test_names_there_and_back():
         ("oracle(shuntin)", UnknownNameError, "Did you mean 'shunting'"),
         ("oracle", UnknownNameError, r"oracle\(SLAM\)"),
         ("oracle(shunting", InvalidValueError, r"without '\)'"),
-        ("oracle(shunting){a=1}", InvalidValueError, r"without '\)'"),
-        ("oracle()", InvalidValueError, r"expected oracle\(SLAM\)"),
         ("oracle(oracle(shunting))", InvalidValueError, "no oracle"),
         ("oracle(shunting,sometimes)", InvalidValueError, "movable or moving.*'sometimes'"),
     ],

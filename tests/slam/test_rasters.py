@@ -7,7 +7,6 @@ import pytest
 from slam import create, rasters
 from slam.errors import InvalidValueError
 from slam.estimate import Raster
-from slam.maps import write_map
 from slam.replay import Track
 from tests.world2d import World2D, frames, laser, office, office_loop
 
@@ -49,13 +48,6 @@ def test_a_part_lies_where_it_lay(turned):
     unknown = np.full((3, 3), np.nan, np.float32)
     nothing = Raster(values=unknown, resolution_m=CELL, T_map_origin=np.zeros(3))
     assert rasters.trimmed(nothing) is None
-
-
-def test_a_map_that_no_image_holds_is_refused(tmp_path, monkeypatch):
-    monkeypatch.setattr("slam.maps.MAX_PIXELS", 100)
-    with pytest.raises(InvalidValueError, match="needs 1 to 100 cells"):
-        write_map(tmp_path / "map", made())
-    assert list(tmp_path.iterdir()) == []
 
 
 def test_a_map_too_large_for_a_raster_has_wider_cells(monkeypatch):

@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """SLAMs named with numbers: in ``create``, in maps on file, and by ``--set``."""
 
-import json
 from dataclasses import dataclass
-from pathlib import Path
 from typing import Any
 
-import numpy as np
 import pytest
 
 import slam
@@ -16,7 +13,7 @@ from slam.frames import Frame
 from slam.odometry import OdometrySlam
 from slam.set_numbers import with_set
 from slam.settings import Settings, number
-from slam.shunting import ShuntingConfig, ShuntingSlam
+from slam.shunting import ShuntingConfig
 from slam.tracker.tracker import Tracker
 from slam.variants import named, parsed
 from tests.world2d import Drive, World2D, arena, frames, laser
@@ -123,20 +120,3 @@ def test_set_is_for_the_slam_it_names() -> None:
         with_set(["shunting"], ["reward"])
     with pytest.raises(InvalidValueError, match="set twice"):
         with_set(["shunting"], ["reward=7", "shunting.reward=8"])
-
-
-def test_a_map_file_keeps_every_number_and_an_older_one_has_the_defaults(tmp_path: Path) -> None:
-    config = ShuntingConfig().changed({"cell_m": 0.1, "matching.local.points": 90})
-    ShuntingSlam(config).save(tmp_path / "map.npz")
-    assert ShuntingSlam.load(tmp_path / "map.npz").config == config
-    with np.load(tmp_path / "map.npz") as archive:
-        content = dict(archive)
-    header = json.loads(str(content["header"]))
-    assert header["config_sha256"] == config.sha256()
-    groups = [key for key, value in header["config"].items() if isinstance(value, dict)]
-    for key in groups:  # as files were written when there were twelve numbers
-        del header["config"][key]
-    del header["config_sha256"], header["sha256"]
-    content["header"] = np.array(json.dumps(header))
-    np.savez(tmp_path / "old.npz", **content)
-    assert ShuntingSlam.load(tmp_path / "old.npz").config == ShuntingConfig(cell_m=0.1)

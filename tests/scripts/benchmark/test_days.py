@@ -2,7 +2,6 @@
 """The leaderboard's section over days: what it runs, what it says, how it gets into the docs."""
 
 import json
-import math
 from pathlib import Path
 
 import pytest
@@ -51,16 +50,6 @@ def test_it_is_eleven_sessions_at_two_shares_of_change_and_a_quick_one_begins_it
     assert [job.file_name() for job in own] == [job.file_name() for job in its[:4]]
 
 
-@pytest.mark.parametrize(
-    ("words", "said"), [("--slam shuntin", "Did you mean 'shunting'"), ("--seeds 0", "--seeds")]
-)
-def test_wrong_words_are_told_before_anything_starts(tmp_path, capsys, words, said):
-    out = tmp_path / "days"
-    assert days.main([str(out), "--quick", *words.split()]) == 1
-    assert said in capsys.readouterr().err
-    assert not out.exists()
-
-
 def test_what_is_written_is_read_back_and_makes_the_same_section(tmp_path):
     days.write(tmp_path, {"schema": 1}, rows())
     back = days.read(tmp_path / "days.json")
@@ -75,12 +64,6 @@ def test_what_is_written_is_read_back_and_makes_the_same_section(tmp_path):
     assert "| map | loaded [in each session] | starts anew [cannot load a map] |" in text
     assert "failed in 6 of 30 sessions, first: `it 'raised'`." in text
     assert days.summary(back)["0.3 shunting"]["found_share"]["n"] == 24
-
-
-def test_an_infinite_error_is_read_back(tmp_path):
-    row = rows(1)[0] | {"rmse_last_m": math.inf}
-    days.write(tmp_path, {"schema": 1}, [row])
-    assert days.read(tmp_path / "days.json")[0]["rmse_last_m"] == math.inf
 
 
 @pytest.mark.parametrize(

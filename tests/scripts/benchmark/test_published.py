@@ -15,10 +15,9 @@ import pytest
 from scripts.benchmark import make, picture, publish, published, runs_file, scores
 from scripts.benchmark.make import QUICK_LEVELS, QUICK_SEEDS
 from scripts.benchmark.scores import ranking
-from scripts.benchmark.tracks import LEVELS, TRACKS, chosen
+from scripts.benchmark.tracks import TRACKS, chosen
 from scripts.comparison.plan import Plan
 from slam.errors import InvalidValueError, LogFormatError
-from tests.scripts.benchmark.test_scores import runs
 from tests.scripts.benchmark.test_submission import rewritten
 
 SHIPPED = runs_file.read()
@@ -134,9 +133,7 @@ def test_a_readers_row_stands_between_the_others_and_no_oracle_runs_again(
     assert "6 of 6 recordings are others here" in " ".join((printed.out + printed.err).split())
 
 
-def test_the_file_is_of_the_folders_alone_and_of_one_commit(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_the_file_is_of_the_folders_alone_and_of_one_commit(tmp_path, monkeypatch):
     path, track, commit = tmp_path / "published.json", TRACKS[TRACK], "0123456789abcdef"
     path.write_bytes(runs_file.FILE.read_bytes())
     (tmp_path / TRACK).mkdir()
@@ -176,11 +173,6 @@ def test_what_is_ahead_is_what_runs():
     assert make.plans_of(trained, SHIPPED)[OTHER].slams == ("kiss-icp", *counts.controls)
 
 
-def test_the_shares_of_a_line_are_of_the_runs_that_rank():
-    (row,) = ranking({"a-v1": runs("mine", [[0, 0, 0, 0, 1], [0, 0, 0, 1, 1]])}, "mine")
-    assert (row["levels"], row["lost_shares"]) == (list(LEVELS), [0.0, 0.0, 0.0, 0.5, 1.0])
-
-
 def test_names_at_the_ends_of_lines_never_overlap():
     for ends in ([20.0] * 12, [200.0] * 12, [26.0, 100.0, 101.0, 102.0, 199.0, 200.0]):
         places = picture.spread(ends, 206.0)
@@ -207,11 +199,3 @@ def test_the_pictures_mark_the_subject_and_hold_every_name_on_a_phone():
 
 def test_a_folder_without_days_is_refused(tmp_path: Path):
     assert publish.main([str(tmp_path)]) == 1
-
-
-def test_no_cell_has_fewer_than_ten_runs_at_level_1():
-    shown = publish.at_the_top(SHIPPED)
-    assert all(runs >= 10 for own in shown.values() for _, runs in own.values())
-    of = publish.board_of(SHIPPED).runs[TRACK]
-    own = [r["lost"] for r in of if (r["slam"], r["dynamism"]) == ("shunting", 1.0)]
-    assert shown[TRACK].get("shunting") in (None, (sum(own), len(own)))

@@ -11,7 +11,7 @@ import pytest
 
 from scripts.benchmark import make, runs_file, submission
 from scripts.benchmark.make import Wanted
-from scripts.benchmark.runs_file import Results, checked_name
+from scripts.benchmark.runs_file import Results
 from scripts.benchmark.tracks import LEVELS, newest
 from scripts.comparison import recording
 from scripts.result_files import MAX_BYTES
@@ -97,29 +97,22 @@ def submitted(data: dict[str, Any], **values: Any) -> None:
     data["submitted"].update(values)
 
 
-HUGE = 10**400  # JSON has it, no double holds it
 WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "schema": (lambda d: d.update(schema=2), "of schema 3"),
     "what": (lambda d: d.update(what="a recipe"), "no results of the benchmark"),
     "name": (lambda d: submitted(d, name="../x"), "name must be up to 40"),
-    "no name": (lambda d: submitted(d, name=""), "name must be a word"),
     "slam": (lambda d: submitted(d, slam="a\nb"), "slam must be"),
     "seconds": (lambda d: submitted(d, seconds=-1), "seconds must be"),
-    "huge seconds": (lambda d: submitted(d, seconds=HUGE), "seconds must be"),
     "another SLAM's name": (lambda d: submitted(d, name="shunting"), "the name of another SLAM"),
     "oracle": (lambda d: submitted(d, slam="oracle(ekf,movable)"), "an oracle is a control"),
-    "more": (lambda d: submitted(d, more=1), "no results"),
     "no tracks": (lambda d: d.update(tracks={}, runs={}), "no runs"),
     "no runs": (lambda d: d.update(runs={}), "each level and seed once"),
     "track": (lambda d: d["tracks"].update(x=""), "track 'x'"),
     "other track": (lambda d: d["tracks"].update({TRACK: "0" * 64}), "none of this version"),
-    "tracks of a list": (lambda d: d.update(tracks=[1]), "tracks must be"),
     "run of no track": (lambda d: moved(d, "x 0 720"), "a track without its hash"),
     "run twice": (lambda d: moved(d, f"{TRACK} 0.0 721"), "a track without its hash"),
     "seed of no track": (lambda d: moved(d, f"{TRACK} 0 {2**32}"), "seed must be"),
     "level": (lambda d: moved(d, f"{TRACK} 0.3 720"), "level must be"),
-    "level of words": (lambda d: moved(d, f"{TRACK} x 720"), "no results"),
-    "run of words": (lambda d: d["runs"].update({KEY: "x"}), "no results"),
     "fewer cells": (lambda d: d["runs"][KEY]["slams"]["mine"].pop(), "no results"),
     "another's run": (lambda d: d["runs"][KEY]["slams"].clear(), "a run of another SLAM"),
     "columns": (lambda d: d["columns"].reverse(), "columns must be poses"),
@@ -128,15 +121,10 @@ WRONG: dict[str, tuple[Callable[[dict[str, Any]], Any], str]] = {
     "outcome": (lambda d: cell(d, "outcome", "won"), "outcome must be"),
     "lost": (lambda d: cell(d, "lost", 1), "lost must be"),
     "error": (lambda d: cell(d, "ate_unaligned_m", -0.1), "ate_unaligned_m must be"),
-    "error of words": (lambda d: cell(d, "ate_unaligned_m", "0"), "ate_unaligned_m must be"),
-    "no error": (lambda d: cell(d, "ate_unaligned_m", None), "ate_unaligned_m must be a number"),
     "no tracking": (lambda d: cell(d, "error_tracking_m", None), "error_tracking_m must be a n"),
     "share": (lambda d: cell(d, "silent_share", 1.5), "silent_share must be"),
-    "huge scans": (lambda d: cell(d, "scans", HUGE), "scans must be"),
     "lost, finished": (lambda d: cell(d, "lost_at_s", 3.0), "lost_at_s must be None"),
     "finished, lost": (lambda d: cell(d, "outcome", "lost"), "lost must be"),
-    "made_with of words": (lambda d: d.update(made_with="me"), "made_with must be a table"),
-    "no made_with": (lambda d: d.pop("made_with"), "made_with"),
 }
 
 
@@ -157,31 +145,7 @@ def test_a_file_of_an_older_mobilia_is_refused_in_one_line(file: Path):
     assert "\n" not in str(told.value)
 
 
-def test_an_object_as_deep_as_can_be_read_is_refused(file: Path):
-    text = file.read_text()
-    for depth in range(20, 2000, 60):  # what can be read but not written again, wherever that is
-        deep = '{"a":' * depth + "1" + "}" * depth
-        data = json.loads(text)
-        try:
-            data["made_with"] = json.loads(deep)
-            data["sha256"] = runs_file._sha256({k: v for k, v in data.items() if k != "sha256"})
-        except RecursionError:
-            data["made_with"] = {}
-        file.write_text(json.dumps(data).replace('"made_with": {}', f'"made_with": {deep}'))
-        with pytest.raises(LogFormatError):
-            submission.read(file)
-
-
-def test_a_slam_may_be_submitted_by_its_own_name_only():
-    assert checked_name("ekf", "ekf") == "ekf"
-    for slam in ("my_slam:MySlam", "ekf{x=1}", "shunting"):
-        with pytest.raises(InvalidValueError, match="'ekf' is the name of another SLAM"):
-            checked_name("ekf", slam)
-
-
-def test_only_recordings_are_checked_and_only_by_the_machine_that_made_them(
-    file: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_only_recordings_are_checked_and_only_by_the_machine_that_made_them(file, monkeypatch):
     monkeypatch.setattr(recording, "record", lambda path, **_: path.write_bytes(b""))
     monkeypatch.setattr(recording, "digest", lambda _: "0" * 64)
     (other,) = submission.made_again(file, 1)
@@ -211,9 +175,7 @@ def test_damage_and_other_files_are_refused(file: Path):
         submission.read(file)
 
 
-def test_a_submission_of_an_older_world_is_read_but_its_scans_are_not_made_again(
-    file: Path, monkeypatch: pytest.MonkeyPatch
-):
+def test_a_submission_of_an_older_world_is_read_but_its_scans_are_not_made_again(file, monkeypatch):
     monkeypatch.setattr(versions, "WORLD", versions.WORLD + 1)
     assert submission.read(file).runs == made().runs
     with pytest.raises(WorldVersionError, match=f"track {TRACK}: cannot be made again"):
@@ -225,9 +187,7 @@ def test_a_submission_of_an_older_world_is_read_but_its_scans_are_not_made_again
     [(1, WorldVersionError), (-1, LogFormatError)],
     ids=["newer", "of no such track"],
 )
-def test_a_submission_that_says_another_world_than_its_tracks_is_refused(
-    file: Path, by: int, kind: type[Exception]
-):
+def test_a_submission_that_says_another_world_than_its_tracks_is_refused(file, by, kind):
     world = versions.WORLD + by
     rewritten(file, lambda data: data.update(world=world))
     with pytest.raises(kind, match=f"world.* {world}"):

@@ -79,9 +79,7 @@ def test_which_tracks_count_is_decided_once_and_a_new_version_is_open_again():
     assert ONE.later(counts=True).sha256 == ONE.later().sha256
 
 
-def test_another_world_moves_no_hash_and_runs_no_track_of_this_one(
-    monkeypatch: pytest.MonkeyPatch,
-):
+def test_another_world_moves_no_hash_and_runs_no_track_of_this_one(monkeypatch: pytest.MonkeyPatch):
     monkeypatch.setattr(versions, "WORLD", WORLD + 1)
     test_a_published_track_never_changes()
     says = f"track tour-guide-v1: cannot be made again, it is of world version {ONE.world}, this"
@@ -130,15 +128,6 @@ def test_every_level_sets_something_else_and_the_top_one_has_room(track: Track):
 
 def test_the_page_has_every_track():
     assert tracks_table(list(newest().values())) in (DOCS / "benchmark.md").read_text()
-
-
-def test_a_harder_version_is_the_newest_and_the_first_still_runs():
-    """On the seeds that it was published with."""
-    first, second = TRACKS["moving-boards-v1"], TRACKS["moving-boards-v2"]
-    assert chosen(["moving-boards"]) == (second,)
-    assert chosen(["moving-boards-v1"]) == (first,)
-    assert (first.test, second.test) == (TEST, FRESH)
-    assert len(first.plan(("ekf",), first.test[:2]).runs()) == 2 * len(LEVELS)
 
 
 def test_names_may_leave_out_the_version_and_a_wrong_one_is_told():

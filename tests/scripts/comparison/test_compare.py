@@ -8,14 +8,12 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
-from scripts.comparison import folder, make, tables
+from scripts.comparison import folder, make
 from scripts.comparison.plan import Plan
-from scripts.comparison.rules import Table, number, word
 from scripts.option_names import Verb
 from scripts.spec import command
 from scripts.verbs import compare as verb
 from slam import Estimate, Trajectory, se2, system
-from slam.errors import LogFormatError
 
 pytestmark = pytest.mark.slow
 SECONDS = 1.6
@@ -168,22 +166,3 @@ def test_the_command_line_of_the_readme(monkeypatch):
     assert plan.levels == (0.0, 0.25, 0.5, 0.75, 1.0)
     assert plan.seeds == tuple(range(100, 110))
     assert seen["ways"] == {"jobs": 2, "cluster": None}
-
-
-def test_a_failure_in_a_table_is_no_formula(tmp_path):
-    rows = [{"slam": "=cmd|' /C calc'!A0", "failure": "-2+3", "off": -0.5, "word": "@SUM(A1)"}]
-    columns = {"slam": word(), "failure": word(), "off": number(least=-1.0), "word": word()}
-    table = Table(columns=columns, key=("slam",))
-    tables.write_checked(tmp_path / "t.csv", rows, table)
-    written = (tmp_path / "t.csv").read_text().splitlines()[1]
-    assert written == "'=cmd|' /C calc'!A0,'-2+3,-0.5,'@SUM(A1)"
-    assert tables.read_csv(tmp_path / "t.csv", table) == rows
-
-
-@pytest.mark.parametrize("whole", [True, False])
-@pytest.mark.parametrize("cell", ["1" + "0" * 101, "9" * 400, "1e101"])
-def test_a_number_past_all_measure_is_refused(tmp_path, cell, whole):
-    table = Table(columns={"seen": number(whole=whole)}, key=("seen",))
-    (tmp_path / "t.csv").write_text(f"seen\n{cell}\n")
-    with pytest.raises(LogFormatError, match="seen must be"):
-        tables.read_csv(tmp_path / "t.csv", table)

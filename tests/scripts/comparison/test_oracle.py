@@ -11,11 +11,9 @@ from scripts.comparison import entry, folder, make
 from scripts.comparison.plan import Plan
 from scripts.comparison.recording import load
 from scripts.output import slams_of
-from sim.simulation import Simulation, tour
 from slam import system
 from slam.frames import BeamClass, Frame
 from slam.odometry import OdometrySlam
-from slam.replay import Replay
 
 pytestmark = pytest.mark.slow
 PLAN = {"scenes": ("arena",), "levels": (1.0,), "seeds": (7,), "seconds": 1.6}
@@ -60,22 +58,6 @@ def test_each_slam_of_a_comparison_sees_what_it_may(tmp_path: Path, monkeypatch)
     run = compared.run("arena", 1.0, 7)
     assert np.array_equal(run.believed(slams[2]).stamps_ns, run.stamps_ns)
     assert slams_of(tmp_path / "recipe.json", compared.recipe["settings"]) == list(slams)
-
-
-def test_in_a_room_without_movers_the_oracle_is_the_slam():
-    """Dynamism 0 and nothing that could move: byte for byte."""
-    simulation = Simulation("arena", seed=3, dynamism=0.0, n_chairs=0, n_people=0, labels=True)
-    names = ("occupancy", "oracle(occupancy)", "oracle(occupancy,moving)")
-    replay = Replay.of({name: slam.create(name) for name in names})
-    frames = [f for k, f in enumerate(tour(simulation, 1.0)) if k % 4 == 0]
-    list(replay.run(frames))
-    for frame in frames:
-        assert frame.labels is not None
-        assert not np.isin(frame.labels.kind, (BeamClass.SEMI_STATIC, BeamClass.MOVING)).any()
-    first, *others = (
-        [e.T_map_robot.tobytes() for e in t.estimates] for t in replay.tracks.values()
-    )
-    assert all(other == first for other in others)
 
 
 def test_by_the_map_it_gets_the_map_and_no_labels(tmp_path: Path):

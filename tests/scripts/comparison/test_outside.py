@@ -33,43 +33,9 @@ def scored(fault: str, *, scan_s: float = 5.0, first_s: float = 10.0) -> dict[st
     return row
 
 
-@pytest.mark.parametrize(
-    ("fault", "outcome"),
-    [("crash", "raised"), ("hang", "hung"), ("nan", "nan"), ("stamp", "bad"), ("garbage", "bad")],
-)
-def test_each_fault_is_an_outcome(fault: str, outcome: str):
-    row = scored(fault, scan_s=0.3 if outcome == "hung" else 5.0)
-    assert (row["outcome"], row["scans"], row["lost"]) == (outcome, 2, 1)
-    assert "scan 2," in str(row["failure"])
-    assert row["lost_at_s"] == pytest.approx(0.4)
-
-
 def test_one_that_cannot_start_has_lost_at_once():
     row = scored("mute", first_s=0.3)
     assert (row["outcome"], row["scans"], row["lost_at_s"]) == ("hung", 0, 0.0)
-
-
-OVER_FILES = """
-from slam.odometry import OdometrySlam
-
-class Fails(OdometrySlam):
-    def estimates_at_end(self):
-        raise RuntimeError("no such file")
-"""
-
-
-def test_a_program_over_files_that_fails_is_not_scored_by_odometry(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    (tmp_path / "over_files.py").write_text(OVER_FILES)
-    monkeypatch.syspath_prepend(tmp_path)
-    drive = recording([(2.0, 1.0)] * 8)
-    entry = Entry("over_files:Fails", drive, Limits())
-    entry.over([frame.without_truth() for frame in drive.frames])
-    row = json.loads(entry.arrays()["row"])
-    assert (row["outcome"], row["scans"], row["lost_at_s"]) == ("raised", 0, 0.0)
-    assert row.get("ate_unaligned_m") is None
-    assert row.get("ms_per_scan_p50") is None
 
 
 OWN = {
@@ -144,14 +110,6 @@ def test_after_a_change_in_code_of_ones_own_what_depends_on_it_is_made_again(
     assert files_of(plan) == before
     (own / file).write_text("")
     assert tuple(a != b for a, b in zip(files_of(plan), before, strict=True)) == remade
-
-
-def test_rows_are_scored_again_when_what_scores_them_changes():
-    plan = Plan(slams=("odometry",), scenes=("arena",), levels=(0.0,), seeds=(1,))
-    ((_, _, job),) = plan.entries()
-    scoring = {"entry.py", "maps.py", "judged.py", "table.py"}
-    assert scoring | {"slam"} <= {path.name for path in job.code}
-    assert not {"tables.py", "verb.py", "plan.py"} & {path.name for path in job.code}
 
 
 def test_a_good_one_is_charged_its_own_time_and_memory():

@@ -16,7 +16,6 @@ from scripts.days import lifelong, scores
 from scripts.days.buildings import beside, identity, name_of, of_comparison
 from scripts.output import read_recipe_words
 from scripts.results import check
-from scripts.verbs import compare
 from slam.errors import InvalidValueError, LogFormatError
 from tests.slam.guests import misbehaving
 
@@ -62,14 +61,6 @@ def test_each_slam_has_a_row_of_each_building(compared):
     assert compared.settings["sessions"] == 2
 
 
-def test_the_command_prints_the_scores(compared, capsys):
-    assert compare.tell_ages(compared.folder) == ", ages.csv, ages_levels.csv"
-    told = " ".join(capsys.readouterr().out.split())
-    assert "arena, motion 0, change 0.3: 1 building of 2 sessions" in told
-    assert "`odometry`: starts anew: cannot load a map; error" in told
-    assert "failed in 2 of 2 sessions, first: `SLAM 'pipe:" in told
-
-
 def test_without_sessions_the_tables_are_the_same_bytes_and_nothing_is_added(compared, tmp_path):
     for name in ("recordings", "entries"):
         shutil.copytree(compared.folder / name, tmp_path / "out" / name)
@@ -111,12 +102,6 @@ def test_a_building_at_each_level_and_the_same_one_only_once():
 def test_sessions_without_change_are_refused(values):
     with pytest.raises(InvalidValueError, match=r"--sessions needs a share.*--change 0\.3 0\.6"):
         replace(PLAN, **values)
-
-
-def test_sessions_take_what_makes_the_buildings(tmp_path):
-    with pytest.raises(InvalidValueError, match="needs more="):
-        make.carry_out(PLAN, tmp_path / "out")
-    assert not (tmp_path / "out").exists()
 
 
 @pytest.mark.parametrize(

@@ -120,13 +120,3 @@ def test_the_table_and_the_sentence_say_who_starts_anew():
     )
     assert guest.startswith("`guest`: starts anew: cannot load a map; error 3.00 cm in session 1")
     assert guest.count("in a frame of its own") == 1
-
-
-def test_a_session_that_was_not_found_or_failed_is_told_in_words():
-    rows = [session(k) for k in range(7)]
-    rows[1] |= {"found_after_s": None, "place": "not found", "rmse_m": None}
-    (line,) = score_tables.sentences([lived(rows)])
-    assert "; error 8.00 cm in the last; ghosts" in line
-    rows = [session(0), session(1, place="failed", rmse_m=None, found_after_s=None)]
-    (line,) = score_tables.sentences([lived(rows, failure="scan 3, `x` raised\nmore")])
-    assert line.endswith("failed in 1 of 2 sessions, first: `scan 3, 'x' raised`.")

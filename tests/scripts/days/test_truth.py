@@ -8,9 +8,8 @@ import pytest
 
 from scripts.days.lifelong import COLUMNS
 from scripts.days.report import operator, summed
-from scripts.days.tables import last_session, printed
+from scripts.days.tables import last_session
 from scripts.days.truth import Spot, Still, ages_of, scored, stands_there, verdicts
-from sim.world.times_of_day import MOST_SESSIONS, clock_s, time_of
 from slam.days.changes import Change
 from slam.tracker.belief.state import State
 
@@ -57,22 +56,6 @@ def test_a_door_is_one_door_before_and_after():
 
 def row(session, **values):
     return {**dict.fromkeys(COLUMNS), "slam": "s", "session": session, "map": "merged", **values}
-
-
-def test_a_page_says_how_the_last_session_ended():
-    rows = [row(2, found_after_s=12.0, place="right"), row(3, map="m.apart1.npz")]
-    (session, *_) = printed("s", rows, whole=True).columns
-    assert list(session.cells) == ["2", "3"]
-    failed = [row(1, map="anew", place="failed")]
-    assert last_session(failed, "1 thing moved") == "Session 1: 1 thing moved; `s` failed."
-
-
-def test_sessions_follow_the_clock():
-    times = [clock_s(k) for k in range(MOST_SESSIONS)]
-    assert times == sorted(set(times))
-    assert times[0] == 9.0 * 3600.0
-    assert times[5] - times[0] == 24.0 * 3600.0
-    assert (times[4] / 3600.0) % 24.0 == time_of(4).hour - 24.0
 
 
 @pytest.mark.parametrize(

@@ -12,7 +12,7 @@ from typer.testing import CliRunner
 from scripts.cli import app
 from scripts.debugger.counterfactual import Inquest, Question, Trial, hold
 from scripts.debugger.make import blame_picture
-from scripts.debugger.recording import Case, Checkpoint, Tape, record
+from scripts.debugger.recording import Case, Tape, record
 from scripts.debugger.words import as_json, headline
 from sim.twins.absence import Change
 from slam.errors import SlamFailedError, UnknownNameError
@@ -162,23 +162,6 @@ def test_a_slam_that_does_not_repeat_itself_is_refused():
     tape = record(case("Moody", 3.0))
     with pytest.raises(SlamFailedError, match="does not repeat itself"):
         hold(tape, Question(at_s=2.0, horizon_s=0.5))
-
-
-def test_a_slam_that_fails_with_other_noise_neither_strays_again_nor_is_cured(
-    startled, monkeypatch
-):
-    def rerun(self, change, last, *, noise=0):
-        if noise:
-            raise SlamFailedError("too noisy")
-        return again(self, change, last)
-
-    again = Checkpoint.rerun
-    monkeypatch.setattr(Checkpoint, "rerun", rerun)
-    found = hold(startled[0], Question(horizon_s=1.0, repeats=1, top=1))
-    assert found.recurs == 0
-    assert found.together
-    assert not found.named
-    assert found.verdict == "undecided"
 
 
 def trial(name: str, share: float, again: int, kind: str = "single") -> Trial:

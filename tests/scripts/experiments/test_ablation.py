@@ -1,8 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The ablation: its cells, what is run on which track, and what is refused."""
 
-import json
-
 import pytest
 
 from scripts.benchmark.tracks import TRACKS
@@ -26,36 +24,6 @@ def test_cells_of_tracks_are_geometric_means_and_losses_are_counted():
     assert oracle == "| oracle(shunting) | 2.00, 1 of 2 | – | 2.00 |"
 
 
-def test_drift_of_tracks_with_carryings_is_not_in_the_last_column():
-    rows = [{"track": "kidnapped-in-a-crowd-v2", "rpe_m_per_m": 0.5, "outcome": "finished"}]
-    assert ablation.overall(rows) == "–"
-
-
 def test_only_the_oracle_of_a_track_runs_there():
     slams = ("shunting", "oracle(shunting)", "oracle(shunting,moving)")
     assert [ablation.fitting(slams, TRACKS[name]) for name in TRACKS_OF] == [slams[:2], slams[::2]]
-
-
-def test_what_cannot_be_run_is_told_in_a_line(tmp_path, capsys):
-    more = ["--folder", str(tmp_path / "a"), "--results", str(tmp_path / "r.json"), "--no-page"]
-    for words, says in (("--level 7", "the level of a track"), ("--track rush-our", "no track")):
-        assert ablation.main([*words.split(), *more]) == 1
-        assert capsys.readouterr().err.startswith(says)
-    assert not list(tmp_path.iterdir())
-
-
-def test_a_track_is_a_comparison_that_goes_on(tmp_path, capsys):
-    words = ["--track", "no-walls-v1", "--level", "1", "--slam", "odometry", "--seeds", "1"]
-    words += ["--folder", str(tmp_path / "out"), "--results", str(tmp_path / "r.json")]
-    made = []
-    for _ in range(2):
-        assert ablation.main(words) == 0
-        files = (tmp_path / "out" / "no-walls-v1").rglob("*.npz")
-        made.append(
-            {file.name: file.stat().st_mtime_ns for file in files if "runs" not in file.parts}
-        )
-        assert "World 2, 1 seeds from 720" in capsys.readouterr().out
-    assert made[0]
-    assert made[0] == made[1]
-    (row,) = json.loads((tmp_path / "r.json").read_text())["runs"].values()
-    assert (row["track"], row["level"], row["slam"]) == ("no-walls-v1", 1.0, "odometry")

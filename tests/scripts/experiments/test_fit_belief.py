@@ -2,14 +2,12 @@
 """The fit of the belief: on samples whose numbers are known, and along a log of known motion."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
-from scripts.experiments import fit_belief
-from scripts.experiments.explained import GOES_ON, PLACE, Drive, Sample, far
-from scripts.experiments.fit_belief import Samples, fitted, left_out, told
+from scripts.experiments.explained import GOES_ON, PLACE, Drive, Sample
+from scripts.experiments.fit_belief import Samples, fitted, left_out
 from slam.tracker.belief.likelihood import ENDS
 from tests.world2d import Drive as Way
 from tests.world2d import World2D, frames, laser, rectangle
@@ -44,26 +42,6 @@ def test_the_numbers_that_made_the_samples_are_found():
     assert float(np.mean(p[samples.right])) > 0.85 > 0.15 > float(np.mean(p[~samples.right]))
 
 
-def test_classes_and_logs_weigh_alike():
-    rng = np.random.default_rng(6)
-    samples = Samples({LOGS[0]: samples_of(rng, 200), LOGS[1]: samples_of(rng, 900)})
-    for log in LOGS[:2]:
-        for kind in (PLACE, GOES_ON):
-            for right in (True, False):
-                own = (samples.log == log) & (samples.kind == kind) & (samples.right == right)
-                assert samples.weight[own].sum() == pytest.approx(1.0)
-
-
-def test_the_tables_say_each_log_and_the_numbers_of_the_slam():
-    rng = np.random.default_rng(7)
-    settings, logs, curve = told({log: samples_of(rng, 300) for log in LOGS}).split("\n\n")
-    assert [line.split("|")[1].strip() for line in settings.splitlines()[2:]] == [
-        f"`belief.{name}`" for name in fit_belief.NAMES
-    ]
-    assert len(logs.splitlines()) == 2 + 2 * (len(LOGS) + 2)
-    assert len(curve.splitlines()) == 2 + len(fit_belief.BINS) - 1
-
-
 def test_a_right_pose_explains_more_than_a_wrong_one_and_going_on_more_than_being_carried():
     way = Way((0.0, 0.0, 0.0), ((0.5, 0.0, 12.0), (0.0, 0.5, 6.3), (0.5, 0.0, 12.0)))
     stream = frames(HALL, way, rate_hz=4.0, spec=laser(181), seed=3)
@@ -78,14 +56,3 @@ def test_a_right_pose_explains_more_than_a_wrong_one_and_going_on_more_than_bein
     assert all(len(own) >= 4 for own in shares.values()), shares
     for kind in (PLACE, GOES_ON):
         assert np.median(shares[kind, True]) > 0.9 > np.median(shares[kind, False])
-
-
-def test_poses_are_far_apart_by_either():
-    assert far(np.array([0.0, 2.0, 0.0]), np.zeros(3), 1.0, 1.0)
-    assert far(np.array([0.0, 0.5, 3.1]), np.array([0.0, 0.0, -1.0]), 1.0, 1.0)
-    assert not far(np.array([0.0, 0.5, 3.1]), np.array([0.0, 0.0, -3.1]), 1.0, 1.0)
-
-
-def test_a_log_that_is_not_there_is_named(tmp_path: Path, capsys: pytest.CaptureFixture[str]):
-    assert fit_belief.main(["--data", str(tmp_path), "--logs", "nowhere"]) == 1
-    assert "nowhere" in capsys.readouterr().err

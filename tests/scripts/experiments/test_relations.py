@@ -2,14 +2,12 @@
 """Relations: the mean error of motions between times, by time and by the lines of the log."""
 
 import math
-from pathlib import Path
 
 import numpy as np
 import pytest
 
 from scripts.experiments import relations
 from slam import se2
-from slam.errors import LogFormatError
 
 pytestmark = pytest.mark.slow
 POSES = np.array([se2.exp([1.0, 0.0, 0.1], t) for t in range(10)])
@@ -46,13 +44,3 @@ def test_between_scans_of_a_sparse_log_odometry_counts():
     assert at(10.2) == pytest.approx([7.5, 0.0, 0.0], abs=1e-5)
     assert at(1.0) == pytest.approx([0.0, 0.0, 0.0])
     assert at(5.0) is None
-
-
-def test_files_are_read_or_refused(tmp_path: Path):
-    file = tmp_path / "a.relations"
-    file.write_text("1.5 2.5 0.1 0.2 0 0 0 0.3\n\n")
-    ((start, end, motion),) = relations.relations_of(file)
-    assert (start, end, motion.tolist()) == (1.5, 2.5, [0.1, 0.2, 0.3])
-    file.write_text("1.5 2.5 0.1\n")
-    with pytest.raises(LogFormatError, match="line 1: 8 numbers"):
-        relations.relations_of(file)

@@ -37,13 +37,3 @@ def test_the_panes_of_a_film_move_on_a_page(tmp_path: Path):
         seen = np.asarray(moving.convert("RGB")).astype(int)
     for (x, y), color in (((720, 110), RED), ((260, 170), BLUE)):
         assert np.abs(seen[y, x] - color).max() < 30
-
-
-@pytest.mark.parametrize(
-    ("size", "seconds", "words"), [((640, 360), 1.0, "must have"), (SIZE, 0.25, "must last 0.5 s")]
-)
-def test_another_film_is_refused(tmp_path: Path, capsys, size: Size, seconds: float, words: str):
-    assert main([str(filmed(tmp_path, size, seconds)), str(tmp_path / "page.webp")]) == 1
-    assert f"film.mp4: a film {words}" in capsys.readouterr().err
-    assert main([str(tmp_path / "nowhere"), str(tmp_path / "page.webp")]) == 1
-    assert not (tmp_path / "page.webp").exists()

@@ -5,7 +5,7 @@ import numpy as np
 import pytest
 
 from scripts.film.map_pane import CloseUp, raster_picture
-from sim.view.draw import GREEN, INK, PAPER, RED, View, robot, scale_bar
+from sim.view.draw import GREEN, INK, PAPER, RED, View, scale_bar
 from sim.view.moment import MOST_POINTS, Path
 from slam import se2
 from slam.system import Raster
@@ -25,18 +25,6 @@ def test_a_cell_is_drawn_at_its_place(yaw: float):
     dark = np.argwhere(picture.sum(axis=2) < 150)
     found = dark.mean(axis=0)[::-1] + 0.5
     np.testing.assert_allclose(found, view.pixels(center)[0], atol=1.0)
-
-
-def test_unknown_is_paper_and_a_robot_is_where_it_is():
-    raster = Raster(
-        values=np.full((4, 4), np.nan, np.float32), resolution_m=1.0, T_map_origin=np.zeros(3)
-    )
-    view = View.fitting((0.0, 0.0, 4.0, 4.0), 100, 100)
-    picture = raster_picture(raster, view, np.zeros(3))
-    assert (picture == picture[0, 0]).all()
-    here = np.array([2.0, 2.0, 0.0])
-    robot(picture, view, here, GREEN)
-    assert (picture[50, 50] == GREEN).all()
 
 
 def test_a_long_trail_keeps_its_ends():

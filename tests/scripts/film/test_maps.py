@@ -1,16 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Maps for pictures: thin walls stay, in no more cells than a picture has room for."""
+"""Maps and films of long runs: neither has more cells or pictures than a file has room for."""
 
 import numpy as np
 import pytest
 
 from scripts.film.encode import FILM_S, LAPSE_FPS, MOST_PICTURES, Pace
-from scripts.single_run.session import drawn, for_file
-from sim.view import moment
-from slam import create
+from scripts.single_run.session import for_file
 from slam.frames import LaserSpec, Scan
 from slam.frontend.seen_space import SeenSpace
-from slam.replay import Track
 from slam.system import Raster
 
 pytestmark = pytest.mark.film
@@ -24,41 +21,6 @@ def made(height, width, at=(-3, 5), seed=0):
     values = np.where(rng.random((height, width)) < 0.1, rng.random((height, width)), np.nan)
     origin = np.array([at[0] * CELL, at[1] * CELL, 0.0])
     return Raster(values=values.astype(np.float32), resolution_m=CELL, T_map_origin=origin)
-
-
-class Kept:
-    """A SLAM that has this map."""
-
-    def __init__(self, raster: Raster) -> None:
-        self.raster = raster
-
-    def map(self) -> Raster:
-        return self.raster
-
-
-def test_a_map_in_pictures_keeps_thin_walls_and_its_extent():
-    raster = made(1001, 530)
-    found = drawn(Track("kept", Kept(raster)), most=300)
-    assert max(found.map.values.shape) <= 300
-    assert found.map.resolution_m == pytest.approx(4 * CELL)
-    assert found.changes is None
-    assert np.nanmax(found.map.values) == np.nanmax(raster.values)
-    blocks = raster.values[:1000, :528].reshape(250, 4, 132, 4)
-    largest = np.fmax.reduce(np.fmax.reduce(blocks, axis=3), axis=1)
-    np.testing.assert_array_equal(found.map.values[:250, :132], largest)
-    np.testing.assert_array_equal(
-        drawn(Track("kept", Kept(raster)), most=1001).map.values, raster.values
-    )
-    assert drawn(Track("none", create("odometry"))) is None
-
-
-def test_a_map_as_shown_keeps_thin_walls(monkeypatch):
-    raster = made(1001, 530)
-    monkeypatch.setattr(moment, "MOST_CELLS", 300)
-    found = moment.small_map(Track("kept", Kept(raster)))
-    assert max(found.values.shape) <= 300
-    assert found.resolution_m == pytest.approx(4 * CELL)
-    assert np.nanmax(found.values) == np.nanmax(raster.values)
 
 
 def test_a_map_too_large_for_an_image_has_coarser_cells_and_says_so(monkeypatch):

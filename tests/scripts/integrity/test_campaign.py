@@ -69,11 +69,6 @@ def test_what_was_done_is_not_done_again(tmp_path, monkeypatch, capsys):
     assert found["command"].startswith("python -m scripts.integrity.campaign --ways chairs")
 
 
-def test_no_run_sums_up_what_is_there(tmp_path, capsys):
-    assert campaign.campaign(words(tmp_path, "--no-run")) == 0
-    assert "| all | 0 | 0 | – (≤ –) |" in capsys.readouterr().out
-
-
 def test_a_case_gives_the_same_numbers_twice():
     first, second = (losses.run(case("boards")) for _ in range(2))
     for row in (first, second):
@@ -122,29 +117,6 @@ class Faulty(OdometrySlam):
         return replace(estimate, T_map_robot=estimate.T_map_robot + self.by, converged=not late)
 
 
-def test_who_trusts_nothing_is_never_hazardous_and_never_recovers(monkeypatch):
-    monkeypatch.setattr(losses, "create", lambda name: Faulty())
-    row = losses.run(case("crowd"))
-    assert row["drive"]["unavailable"] == 60
-    assert row["drive"]["hazardous"] == row["losses"][0]["hazardous"] == 0
-    assert row["drive"]["outages"] == [math.inf]
-
-
-def test_a_slam_that_fails_leaves_no_loss(monkeypatch):
-    monkeypatch.setattr(losses, "create", lambda name: Faulty())
-    monkeypatch.setattr(Faulty, "fails", True)
-    row = losses.run(case("crowd"))
-    assert "no more" in row["failed"]
-    assert row["losses"] == []
-    found = summary([row])
-    assert (found["failed"], found["losses"], found["scans"]) == (1, 0, 0)
-
-
-def test_who_cannot_be_pushed_is_named():
-    with pytest.raises(InvalidValueError, match="'odometry' cannot be pushed"):
-        losses.run(case("push"))
-
-
 def test_a_push_is_undone_or_counted(monkeypatch):
     monkeypatch.setattr(losses, "create", lambda name: Faulty())
     monkeypatch.setattr(losses.kidnap, "AFTER_S", 1.0)
@@ -152,13 +124,3 @@ def test_a_push_is_undone_or_counted(monkeypatch):
     row = losses.run(case("push"))
     assert [loss["event"] for loss in row["losses"]].count("push m") in (2, 3)
     assert all(math.isinf(loss["recovered_s"]) for loss in row["losses"])  # odometry never can
-
-
-def test_logs_are_found_below_folders(tmp_path):
-    for name in ("b/one.log.xz", "a/two.log", "a/notes.txt"):
-        (tmp_path / name).parent.mkdir(exist_ok=True)
-        (tmp_path / name).touch()
-    names = [path.name for path in campaign.logs_in([tmp_path])]
-    assert names == ["two.log", "one.log.xz"]
-    with pytest.raises(InvalidValueError, match="--logs must name a log"):
-        campaign.logs_in([tmp_path / "a" / "notes.txt"])

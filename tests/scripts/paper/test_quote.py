@@ -1,14 +1,12 @@
 # SPDX-License-Identifier: Apache-2.0
 """Results on a page: tables between marks, pictures small and beside it."""
 
-import io
 from pathlib import Path
 
-import numpy as np
 import pytest
 from PIL import Image
 
-from scripts.paper.quote import compact, quote
+from scripts.paper.quote import quote
 from scripts.paper.report import TABLE_3, Report, new_figure, paper_table
 from scripts.paper.runs import Plan
 from slam.errors import InvalidValueError
@@ -59,16 +57,6 @@ def test_its_figures_come_along_and_those_of_before_go(tmp_path: Path):
     assert sorted(path.name for path in pictures.iterdir()) == names
     with Image.open(pictures / "office-rmse.png") as small:
         assert small.size == (520, 390)
-
-
-def test_a_colour_of_few_pixels_is_kept(tmp_path: Path):
-    shades = np.random.default_rng(0).integers(0, 256, (400, 600, 1), dtype=np.uint8)
-    image = np.concatenate([np.full_like(shades, 255), shades, shades // 2], axis=2)
-    image[100, 100] = image[200, 300] = (31, 97, 190)
-    Image.fromarray(image).save(tmp_path / "dots.png")
-    with Image.open(io.BytesIO(compact(tmp_path / "dots.png", most=1_000_000))) as small:
-        kept = np.asarray(small.convert("RGB")).astype(int)
-    np.testing.assert_allclose(kept[100, 100], (31, 97, 190), atol=12)
 
 
 def test_the_papers_table_stands_beside_ours_in_the_summary(tmp_path: Path):

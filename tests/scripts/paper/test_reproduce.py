@@ -9,9 +9,7 @@ import numpy as np
 import pytest
 from scipy.io import savemat
 
-from scripts.paper.census import Census
-from scripts.paper.report import below_printed
-from scripts.paper.runs import Plan, statistics
+from scripts.paper.runs import Plan
 from scripts.spec import command
 from scripts.verbs.reproduce import EXPERIMENTS, Reproduce, experiment
 from slam import se2
@@ -112,14 +110,6 @@ def test_without_the_data_it_says_where_to_get_it(tmp_path):
         command(Reproduce)(["nonsense"], out=tmp_path)
 
 
-def test_a_missing_graph_is_told_before_anything_runs(tmp_path, park):
-    for name in ("features_trees.mat", "aa3_gpsx.mat"):
-        (tmp_path / name).write_bytes((park / name).read_bytes())
-    with pytest.raises(LogFormatError, match=r"no graph_known_association\.txt"):
-        experiment("victoria-park")(Plan(out=tmp_path / "out", data=tmp_path))
-    assert not (tmp_path / "out").exists()
-
-
 def test_the_graph_is_stamped_by_the_distance_driven(park):
     frames = list(read_victoria_park(park))
     graph = read_graph(park)
@@ -129,33 +119,3 @@ def test_the_graph_is_stamped_by_the_distance_driven(park):
     np.testing.assert_allclose(se2.wrap_array(track.poses[:, 2] - truth[:, 2]), 0.0, atol=0.005)
     again = graph.optimised()
     np.testing.assert_allclose(again.poses, graph.poses, atol=1e-3)
-
-
-def test_census_counts_what_is_missed_spurious_and_deleted():
-    true = np.array([[0.0, 0.0], [5.0, 0.0], [10.0, 0.0]])
-    census = Census(true)
-    census.take(true[:2] + 0.1, np.array([3, 4]))
-    census.take(np.array([[0.1, 0.0], [20.0, 0.0], [0.2, 0.0]]), np.array([3, 5, 6]))
-    numbers = census.numbers()
-    assert numbers["misses"] == 2
-    assert numbers["spurious"] == 2
-    assert (numbers["gone"], numbers["deleted by mistake"]) == (1, 1)
-    # the one that was at 5 m is still there, wherever the map has it now
-    census.take(np.array([[0.1, 0.0], [25.0, 0.0]]), np.array([3, 4]))
-    assert census.numbers()["misses"] == 2
-    assert (census.numbers()["gone"], census.numbers()["deleted by mistake"]) == (1, 0)
-
-
-def test_statistics_are_the_papers_and_its_identity_holds():
-    e = np.random.default_rng(0).normal(0.3, 1.0, (50, 2))
-    s = statistics(e, ("x", "y"))
-    np.testing.assert_allclose(s["mean x"], e[:, 0].mean())
-    np.testing.assert_allclose(s["var_p y"], s["var_e y"] + 50 / 49 * s["mean y"] ** 2)
-    assert math.isnan(statistics(e[:1], ("x", "y"))["mean x"])
-
-
-def test_short_falls_are_bold():
-    runs = [{"ours": {"mean x": 0.5, "var_e x": 0.001}}]
-    told = below_printed({"EKF": {}, "shunting": {"x": (0.1, 0.01, 0.0)}}, runs, "ours")
-    assert told[0].startswith("**x |mean(e)|")
-    assert not told[1].startswith("**")

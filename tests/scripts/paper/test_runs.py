@@ -7,8 +7,8 @@ from pathlib import Path
 import numpy as np
 import pytest
 
-from scripts.jobs import _digest, run_jobs
-from scripts.paper.runs import job, load_run, save_run, sign_test, spread, spread_text
+from scripts.jobs import _digest
+from scripts.paper.runs import job, save_run, sign_test, spread, spread_text
 
 pytestmark = pytest.mark.slow
 
@@ -34,15 +34,6 @@ def test_a_run_is_made_again_when_its_data_change_and_not_when_their_folder_is_n
     assert name(str(tmp_path)) == before
     file.write_bytes(b"2")
     assert name(str(tmp_path)) != before
-
-
-def test_runs_come_back_as_they_were(tmp_path):
-    (made,) = run_jobs([job("a", a_run, seed=7, data=str(tmp_path))], tmp_path).values()
-    run = load_run(made)
-    assert run.numbers["seed"] == 7
-    assert math.isnan(run.numbers["θ"])
-    assert list(run.arrays) == ["poses"]
-    np.testing.assert_array_equal(run.arrays["poses"], np.eye(3))
 
 
 def test_medians_and_sign_tests():

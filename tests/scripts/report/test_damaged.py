@@ -109,8 +109,6 @@ def setting(key: str, value: Any):
     [
         (array("static_map_resolution_m", 0.0),
          "array 'static_map_resolution_m' must lie in 0.001..1000, got 0.0"),
-        (array("slam0_map_resolution_m", np.nan),
-         "array 'slam0_map_resolution_m' must be finite, got nan"),
         (array("truth", lambda a: a[:, :2]), "array 'truth' must have shape (20 scans, 3), got "),
         (array("hit", lambda a: a + 9), "array 'hit' must lie in -2..1, got 9"),
         (array("moving", lambda a: a * 1.0), "array 'moving' must hold booleans, got float64"),
@@ -119,10 +117,7 @@ def setting(key: str, value: Any):
         (array("stamps_ns", lambda a: a[::-1]), "array 'stamps_ns' must strictly increase"),
         (cell("runs.csv", "seed", "nan"),
          "runs.csv:2: seed must be a whole number from 0 to 9.22337e+18, got 'nan'"),
-        (cell("runs.csv", "ate_unaligned_m", "far"),
-         "ate_unaligned_m must be a number >= 0 or None, got 'far'"),
         (cell("runs.csv", "ate_unaligned_m", "1e300"), "must be at most 1e+100 or infinite, got"),
-        (cell("levels.csv", "n", "1.5"), "n must be a whole number from 1 to"),
         (cell("runs.csv", "outcome", "well"), "outcome must be one of bad, finished, hung, lost,"),
         (cell("runs.csv", "slam", "karto"),
          "row 1: column 'slam' must be one of settings.slams of the recipe, got 'karto'"),
@@ -130,8 +125,6 @@ def setting(key: str, value: Any):
         (cell("ages.csv", "found", "9"), "found must be at most to_find, 4, got 9"),
         (setting("machine", ["processor"]), "settings.machine must be a table, got ['processor']"),
         (setting("slams", "shunting"), "settings.slams must be a list of 1 or more values"),
-        (setting("seeds", [1, 1]), "settings.seeds must name each once, got [1, 1]"),
-        (setting("every", "8"), "settings.every must be a whole number from 1 to 1000, got '8'"),
     ],
 )  # fmt: skip
 def test_one_wrong_value_is_named_with_what_is_wanted(folder: Path, harm, says: str):

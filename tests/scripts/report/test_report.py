@@ -8,7 +8,6 @@ import sys
 from html.parser import HTMLParser
 from pathlib import Path
 
-import numpy as np
 import pytest
 from typer.testing import CliRunner
 
@@ -16,7 +15,7 @@ from scripts import cli
 from scripts.closed_loop.tables import driven
 from scripts.comparison import folder as files
 from scripts.metrics.table import METRICS, digits
-from scripts.report import page, pictures, tables
+from scripts.report import page, tables
 from scripts.report.study import study, verdict
 from slam.errors import InvalidValueError, LogFormatError
 from tests.scripts.report import made
@@ -103,16 +102,6 @@ def test_tables_show_units_intervals_and_failures(folder: Path):
     ]
 
 
-def test_a_ratio_has_its_interval(folder: Path):
-    rows = {row[0].text: row for row in tables.growth(study(folder), "room").rows}
-    assert [(cell.text, cell.small) for cell in rows["ekf"][3:]] == [
-        ("30.0 ×", "30.0 to 30.0"),
-        ("0 of 6", "0 to 39 %"),
-        ("0 of 6", "0 to 39 %"),
-    ]
-    assert rows[made.OWN][3].text == "∞ ×"
-
-
 def kept(folder: Path, keep) -> None:
     """Rewrite the tables of a comparison with some of its rows alone."""
     rows = [row for row in files.read(folder).runs if keep(row)]
@@ -121,32 +110,6 @@ def kept(folder: Path, keep) -> None:
     recipe["settings"]["slams"] = list(dict.fromkeys(row["slam"] for row in rows))
     recipe["settings"]["levels"] = sorted({row["dynamism"] for row in rows})
     (folder / "recipe.json").write_text(json.dumps(recipe))
-
-
-@pytest.mark.parametrize(
-    ("keep", "head", "first"),
-    [
-        (lambda row: row["slam"] == "ekf", ["dynamism"], ["0", "1"]),
-        (lambda row: row["dynamism"] == 1.0, ["SLAM"], [made.OURS, "ekf", made.OWN]),
-    ],
-)
-def test_tables_of_one_column_or_row_are_one_table(tmp_path: Path, keep, head, first):
-    folder = made.make(tmp_path / "compare")
-    kept(folder, keep)
-    one = study(folder)
-    shown = [METRICS[key] for key in ("rpe_m_per_m", "lost", "ate_unaligned_m")]
-    (table,) = tables.of_levels(one, "room", shown)
-    assert table.head == [head[0], *(metric.heading for metric in shown)]
-    assert [row[0].text for row in table.rows] == first
-    assert len(tables.of_outcomes(one)) == 1
-    if one.rivals:
-        (table,) = tables.of_pairs(one, "room", shown)
-        assert [row[0].text for row in table.rows] == one.rivals
-
-
-def test_the_moving_share_counts_beams_on_what_moves(folder: Path):
-    run = study(folder).compared.run("room", 1.0, 100)
-    np.testing.assert_array_equal(pictures.moving_share(run), np.arange(made.SCANS) % 2 == 0)
 
 
 def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path):
@@ -179,12 +142,6 @@ def test_what_is_no_drive_is_told(tmp_path: Path, name: str, content: str, says:
     (folder / name).write_text(content)
     with pytest.raises(LogFormatError, match=says):
         driven(folder)
-
-
-def test_little_is_enough_for_a_page(tmp_path: Path):
-    folder = made.make(tmp_path / "compare", seeds=(100,))
-    kept(folder, lambda row: row["dynamism"] == 1.0 and row["slam"] == made.OWN)  # all failed
-    assert "Where" not in page.render(study(folder))
 
 
 def test_the_page_is_about_whom_one_asks(written: Path, tmp_path: Path):

@@ -21,6 +21,7 @@ import traceback
 from collections import Counter
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 from unittest.mock import ANY
@@ -75,11 +76,11 @@ def scene(path: Path) -> None:
 
 
 def log(folder: Path) -> None:
-    """All frames."""
+    """All frames, whose stamps rise."""
     (file,) = (f for f in folder.iterdir() if f.name.startswith("a.") and f.suffix != ".toml")
     text = folder / "a.toml"
-    for _ in open_log(file, text_format=text if text.exists() else None):
-        pass
+    stamps = [f.stamp_ns for f in open_log(file, text_format=text if text.exists() else None)]
+    assert all(a < b for a, b in pairwise(stamps)), "a stamp does not rise"
 
 
 LOGS = (

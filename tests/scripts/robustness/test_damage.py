@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """Whatever is done to a result, verify says so, and nobody reads something else from it."""
 
-import json
 import shutil
 import subprocess
 from collections.abc import Callable
@@ -13,7 +12,6 @@ import typer
 
 from scripts import results
 from scripts.output import write_recipe
-from scripts.report.page import REPORT
 from scripts.spec import command
 from scripts.verbs.verify import Verify
 from scripts.whole_folder import whole_folder
@@ -25,7 +23,6 @@ from sim.recording.verify import METADATA, check_bag
 from slam import locks
 from slam.errors import LogFormatError, OutputError
 from tests.scripts.robustness.samples import (
-    COMPARED,
     made,
     misread,
     missed_by_verify,
@@ -207,49 +204,6 @@ def test_the_sums_of_a_dataset_are_those_of_sha256sum(dataset):
     assert done.returncode == 0
     listed = {path.relative_to(dataset).as_posix() for path in dataset.rglob("*")}
     assert set(read_sums(dataset)) == listed - {SUMS, *EPISODES}
-
-
-@pytest.mark.parametrize(
-    "change",
-    [
-        {"episodes": 10**9},
-        {"dynamisms": [0.001 * k for k in range(1001)], "episodes": 1000},
-        {"dynamisms": 3},
-        {"episodes": "2"},
-        {"schema": 2},
-        {"extra": 1},
-        {"recipe": {"scene": "arena"}},
-    ],
-)
-def test_a_plan_that_cannot_be_is_refused(copied, change):
-    path = copied / "dataset.json"
-    path.write_text(json.dumps(json.loads(path.read_text()) | change))
-    with pytest.raises(LogFormatError, match=r"dataset\.json"):
-        read_plan(copied)
-    assert "damaged" in verdicts(copied)
-
-
-def test_a_flipped_recording_and_a_torn_entry_are_made_again(comparison, tmp_path, capsys):
-    from scripts.comparison.make import carry_out
-
-    folder = Path(shutil.copytree(comparison, tmp_path / "compared"))
-    recording = min((folder / "recordings").glob("*.npz"))
-    whole = recording.read_bytes()
-    recording.write_bytes(whole[:500] + bytes([whole[500] ^ 1]) + whole[501:])
-    entry = min((folder / "entries").glob("*odometry*.npz"))
-    entry.write_bytes(entry.read_bytes()[:300])
-    (folder / "notes.txt").write_text("mine")
-    (folder / "a\udc80\n.npz").write_text("no name that a list could hold")
-    carry_out(COMPARED, folder)
-    told = capsys.readouterr().out.replace("\n", "")
-    assert f"made again: {recording} is damaged" in told
-    assert f"made again: {entry} is damaged" in told
-    assert recording.read_bytes() == whole
-    assert (status(folder), verdicts(folder)) == (4, {"foreign"})
-    for mine in (*folder.glob("*.txt"), folder / "a\udc80\n.npz"):
-        mine.unlink()
-    assert status(folder) == 0
-    assert REPORT in read_sums(folder)
 
 
 def test_a_result_within_a_comparison_is_one_of_its_own(comparison, tmp_path):

@@ -19,9 +19,6 @@ from scripts.whole_folder import whole_folder
 from sim.recording.sums import write_sums
 from slam.errors import OutputError
 from slam.files import write_bytes
-from slam.maps import read_map, write_map
-from slam.shunting import ShuntingSlam
-from slam.system import Raster
 from tests.processes import python
 
 pytestmark = pytest.mark.fuzz
@@ -102,24 +99,6 @@ def test_ffmpeg_that_ends_badly_leaves_no_film(tmp_path: Path, monkeypatch, pict
     with pytest.raises(OutputError, match="a film needs a picture"):
         filmed(tmp_path / "film.mp4", 0)
     assert not (tmp_path / "film.mp4").exists()
-
-
-def test_maps(disk: Disk):
-    place = disk(64)
-    values = np.zeros((10, 10), dtype=np.float32)
-    small = Raster(values=values, resolution_m=0.05, T_map_origin=np.zeros(3))
-    large = Raster(values=np.tile(values, (40, 40)), resolution_m=0.05, T_map_origin=np.zeros(3))
-    write_map(place / "map", small)
-    ShuntingSlam().save(place / "map.npz")
-    before = tree(place)
-    with pytest.raises(OutputError, match=f"cannot write {place}/map.pgm: {FULL}"):
-        write_map(place / "map", large)
-    write_bytes(place / "rest", b"0" * (os.statvfs(place).f_bavail * os.statvfs(place).f_bsize))
-    with pytest.raises(OutputError, match=f"cannot write {place}/map.npz: {FULL}"):
-        ShuntingSlam().save(place / "map.npz")
-    (place / "rest").unlink()
-    assert tree(place) == before
-    assert read_map(place / "map.yaml").values.shape == (10, 10)
 
 
 def test_tables_of_a_comparison(disk: Disk, tmp_path: Path):

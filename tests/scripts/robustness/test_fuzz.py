@@ -20,7 +20,12 @@ pytestmark = pytest.mark.fuzz
 Rng = np.random.Generator
 
 
-@pytest.mark.parametrize(("inputs", "kinds"), [(320, ()), (240, ("plan", "lab", "named"))])
+TEXT_LOGS = ("carmen", "rawlog", "robotlaser", "rawlaser")
+
+
+@pytest.mark.parametrize(
+    ("inputs", "kinds"), [(320, ()), (240, ("plan", "lab", "named")), (160, TEXT_LOGS)]
+)
 def test_damaged_and_hostile_files_are_read_or_refused_by_name(inputs: int, kinds: tuple[str]):
     """The short version; one of 20 000 takes a quarter of an hour."""
     words = ["--inputs", inputs, "--seed", "3", *(("--kinds", *kinds) if kinds else ())]

@@ -64,21 +64,7 @@ def test_a_folder_is_synced_whole_then_named(calls: Calls, tmp_path: Path, there
     assert (tmp_path / "run" / "a.txt").read_text() == "new"
 
 
-def test_where_names_cannot_be_swapped_the_new_folder_is_there(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-):
-    monkeypatch.setattr(files, "exchange", lambda one, other: False)
-    for text in ("old", "new"):
-        with whole_folder(tmp_path / "run", overwrite=True) as part:
-            files.write_text(part / "a.txt", text)
-            write_recipe(part, "test", {})
-    assert (tmp_path / "run" / "a.txt").read_text() == "new"
-    assert [path.name for path in tmp_path.iterdir()] == ["run"]
-
-
-def test_of_a_map_the_image_is_named_before_the_file_that_vouches_for_it(
-    calls: Calls, tmp_path: Path
-):
+def test_of_a_map_the_image_is_named_before_the_file_that_vouches_for_it(calls, tmp_path):
     values = np.full((3, 3), 0.5, dtype=np.float32)
     write_map(tmp_path / "map", Raster(values=values, resolution_m=0.1, T_map_origin=np.zeros(3)))
     renames = [name for what, name in calls if what == "rename"]

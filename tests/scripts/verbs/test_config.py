@@ -78,13 +78,6 @@ def test_every_number_of_the_actors_is_read_by_a_kernel_or_its_caller() -> None:
     assert {row.path.rpartition(".")[2] for row in ACTORS.rows()} <= read
 
 
-def test_the_table_fits_a_terminal(capsys: pytest.CaptureFixture[str]) -> None:
-    config("shunting", "loops", as_json=False)
-    lines = capsys.readouterr().out.splitlines()
-    assert max(map(len, lines)) <= 110
-    assert any("key_m" in line and "between key frames" in line for line in lines)
-
-
 def test_commas_inside_braces_part_no_names() -> None:
     assert named(["shunting{cell_m=0.1,reward=7},ekf", "pipe:a,b"]) == (
         "shunting{cell_m=0.1,reward=7}", "ekf", "pipe:a,b",

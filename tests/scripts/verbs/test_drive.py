@@ -24,13 +24,6 @@ def plan(**changes):
     return DrivePlan(**{**settings, **SHORT, **changes})
 
 
-def test_a_run_depends_on_what_drives_it_and_not_on_tables():
-    ((_, job),) = plan().jobs()
-    names = {path.name for path in job.code}
-    assert {"slam", "sim", "scenes", "runs.py"} <= names
-    assert not {"plan.py", "tables.py", "pictures.py", "film.py"} & names
-
-
 def test_what_is_lost_is_made_again_to_the_same_bytes(tmp_path):
     wanted = plan(seeds=(100, 101))
     carry_out(wanted, tmp_path)

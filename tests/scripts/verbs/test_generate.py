@@ -24,7 +24,7 @@ from sim.recording.dataset import Plan, check_dataset, read_plan, writing
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.sums import SUMS, write_sums
 from sim.recording.verify import regenerate
-from slam.errors import InvalidValueError, LogFormatError, OutputError
+from slam.errors import LogFormatError, OutputError
 from slam.logs import read_bag
 from tests.processes import python
 
@@ -197,11 +197,6 @@ def test_two_writers_another_plan_and_foreign_files_are_refused(serial, tmp_path
     assert [p.name for p in (tmp_path / "mine").iterdir()] == ["thesis.tex"]
 
 
-def test_a_cluster_that_is_nowhere_is_refused(tmp_path):
-    with pytest.raises(InvalidValueError, match="no Dask scheduler"):
-        generate(["arena"], tmp_path / "b", **SETTINGS, cluster="nowhere")
-
-
 def test_twins_share_path_and_odometry_and_differ_in_what_moves(tmp_path):
     out = tmp_path / "data"
     generate(["arena"], out, episodes=1, seconds=2.0, seed=2, dynamism=["1"], twins=True)
@@ -301,13 +296,9 @@ def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_pat
     assert (out / SUMS).read_bytes() == (serial / SUMS).read_bytes()
 
 
-@pytest.mark.parametrize("verb", ["generate", "compare"])
-def test_a_scheduler_of_dask_that_dies_is_one_line_and_the_command_goes_on(tmp_path, verb):
-    words = {
-        "generate": "generate arena --seconds 20 --episodes 6",
-        "compare": "compare --slam odometry --scene arena --dynamism 0.5 --seeds 6 --seconds 20",
-    }[verb]
-    command = [sys.executable, "-m", "scripts", *words.split(), "--out", str(tmp_path / "out")]
+def test_a_scheduler_of_dask_that_dies_is_one_line_and_the_command_goes_on(tmp_path):
+    words = ["generate", "arena", "--seconds", "20", "--episodes", "6"]
+    command = [sys.executable, "-m", "scripts", *words, "--out", str(tmp_path / "out")]
     with dask_cluster(tmp_path) as (address, parts):
         begun = subprocess.Popen(
             [*command, "--cluster", address], cwd=REPO, env=environment(), text=True,

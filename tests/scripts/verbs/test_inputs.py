@@ -24,8 +24,6 @@ from slam import inputs
 from slam.errors import OutputError
 from slam.files import write_text
 from slam.logs import write_carmen
-from slam.logs.bag_topics import Bag
-from slam.maps import read_map
 
 pytestmark = pytest.mark.slow
 REFUSED = "is what this command reads: write to another place"
@@ -100,9 +98,7 @@ WAYS = [
 
 
 @pytest.mark.parametrize("way", WAYS, ids=lambda way: way.words)
-def test_what_is_read_is_not_written_over(
-    way: Way, made: Path, tmp_path: Path, called, monkeypatch
-):
+def test_what_is_read_is_not_written_over(way, made, tmp_path, called, monkeypatch):
     here = Path(shutil.copytree(made, tmp_path / "here"))
     monkeypatch.chdir(here)
     way.first(here)
@@ -164,15 +160,6 @@ def test_tables_that_would_take_the_place_of_what_is_read_are_not_moved(tmp_path
     assert everything(tmp_path) == {str(tmp_path / "submission_a.json"): b"theirs"}
 
 
-def test_readers_note_what_a_file_names(made: Path):
-    for read, name in ((read_map, "lab.png"), (lambda _: Bag(made / "bag"), BAG)):
-        with inputs.of_one_command():
-            read(made / "lab.yaml")
-            with pytest.raises(OutputError, match=REFUSED):
-                write_text(made / name, "over it")
-    write_text(made / "other.png", "outside of a command nothing is noted")
-
-
 def test_links_and_other_ways_to_say_it_are_the_same_file(tmp_path: Path):
     (tmp_path / "a").write_text("mine")
     (tmp_path / "link").symlink_to("a")
@@ -200,10 +187,3 @@ def test_every_path_of_a_verb_is_read_or_written():
         "out", "strip_to", "replay", "page", "map_out"
     }  # fmt: skip
     assert all(issubclass(one.cls, Verb) for one in app.registered_commands)
-
-
-@pytest.mark.parametrize("word", ["pipe:" + "x" * 5000, "x/" * 5000])
-def test_a_command_longer_than_the_name_of_a_file_is_no_folder(word: str):
-    command = Verb(name="run", params=[])
-    with inputs.of_one_command():
-        command._note_inputs({"slam": word, "scene": "arena", "out": Path("x" * 5000)})

@@ -18,28 +18,10 @@ def test_the_seed_and_only_the_seed_decides_a_stream():
         assert not np.array_equal(same, other)
 
 
-def test_streams_of_one_seed_differ():
-    draws = {name: Seeds(3).generator(name).random() for name in STREAMS}
-    assert len(set(draws.values())) == len(STREAMS)
-
-
-def test_overriding_one_stream_leaves_the_others():
-    plain, changed = Seeds(3), Seeds(3, lidar=7)
-    for name in STREAMS:
-        equal = np.array_equal(plain.counters(name, 5), changed.counters(name, 5))
-        assert equal == (name != "lidar")
-    np.testing.assert_array_equal(changed.counters("lidar", 5), Seeds(7).counters("lidar", 5))
-
-
 def test_the_first_counters_do_not_depend_on_how_many_there_are():
     np.testing.assert_array_equal(
         Seeds(3).counters("chairs", 4), Seeds(3).counters("chairs", 9)[:4]
     )
-
-
-def test_a_record_makes_the_same_seeds_again():
-    seeds = Seeds(5, people=2)
-    assert Seeds(**seeds.record()).record() == {"seed": 5, "people": 2}
 
 
 @pytest.mark.parametrize("seed", [-1, 1.5, True, "1"])
@@ -68,12 +50,6 @@ def test_compiled_draws_have_their_distributions():
     assert abs(waits.mean() - 2.0) < 4.0 * 2.0 / math.sqrt(n)
     assert waiting(counters, 0, 0.0) == math.inf
     assert 2.0 <= between(counters, 0, 2.0, 3.0) < 3.0
-
-
-def test_dynamism_zero_stops_everything():
-    still = Dynamism.at(0)
-    assert still.chair_push_rate == still.bin_kick_rate == still.door_rate == 0.0
-    assert still.stay_mean == math.inf
 
 
 def test_every_rate_rises_with_the_dynamism():

@@ -68,17 +68,6 @@ def test_another_world_is_another_version():
     assert len(set(DIGESTS.values())) == len(DIGESTS)
 
 
-def test_what_is_said_of_version_0_is_true():
-    """The table of then: pushes 0.05, 0.02 and 0.02 d, doors 0.02 d, stays 4 / d - 2."""
-    for d in (0.2, 0.5, 1.0):
-        now = Dynamism.at(d / 3.0)
-        assert now.chair_push_rate == pytest.approx(0.05 * d)
-        assert now.bin_kick_rate == now.load_push_rate == pytest.approx(0.02 * d)
-        assert Dynamism.at(d / 2.0).door_rate == pytest.approx(0.02 * d)
-        stay_s = Dynamism.at(3.0 * d / (1.0 + 2.0 * d)).stay_mean
-        assert stay_s == pytest.approx(4.0 / d - 2.0)
-
-
 @pytest.mark.filterwarnings("ignore:.*out of date:DeprecationWarning")
 def test_ids_carry_the_version_and_old_ones_say_what_became_of_them():
     assert gymnasium.spec(f"mobilia/Office-v{WORLD}")

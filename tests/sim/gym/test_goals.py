@@ -177,18 +177,11 @@ def test_a_step_of_several_scans_ends_with_the_episode():
     ("settings", "message"),
     [
         ({"goal": "anywhere"}, "goal must be random or 2 values"),
-        ({"goal": (1.0,)}, "goal must be random or 2 values"),
-        ({"goal": (math.nan, 0.0)}, r"goal\[0\] must be a number"),
-        ({"goal": (1e9, 0.0)}, r"goal\[0\] must be a number from -10000 to 10000"),
         ({"reward": "dense"}, "reward must be one of progress, sparse, shaped"),
-        ({"reward": 3}, "reward must be one of"),
         ({"frame_skip": 0}, "frame_skip must be a whole number from 1"),
-        ({"frame_skip": 2.5}, "frame_skip"),
-        ({"frame_skip": True}, "frame_skip"),
         ({"scene": "offise"}, "Did you mean 'office'"),
         ({"odometry": "pionear3dx"}, "Did you mean 'pioneer3dx'"),
         ({"scan_height_m": 3.0}, "scan_height_m must be a number from"),
-        ({"scan_height_m": "low"}, "scan_height_m must be a number"),
     ],
     ids=repr,
 )

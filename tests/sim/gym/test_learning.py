@@ -68,14 +68,3 @@ def test_stable_baselines_gets_ends_last_observations_and_the_same_bits():
     assert ours.env_method("close") == [None, None]
     ours.close()
     plain.close()
-
-
-def test_rooms_take_a_vector_environment_of_gymnasium():
-    pytest.importorskip("stable_baselines3")
-    from sim.gym.learning import Rooms
-
-    mode = gymnasium.vector.AutoresetMode.DISABLED
-    many = gymnasium.vector.SyncVectorEnv([lambda: gymnasium.make(ID)] * 2, autoreset_mode=mode)
-    rooms = Rooms(many)
-    assert rooms.get_attr("unwrapped", [1])[0].time_limit_s > 0.0
-    rooms.close()

@@ -66,13 +66,6 @@ def test_it_begins_anew_with_each_episode_and_the_rest_stays_as_without_it():
     assert not np.array_equal(first[-1]["pose"], rollout(env, seed=4)[-1][0]["pose"])
 
 
-def test_without_a_goal_there_is_none():
-    env = make("odometry")
-    observation, _ = env.reset(seed=0)
-    assert observation["goal"].tolist() == [0.0, 0.0]
-    assert env.observation_space.contains(observation)
-
-
 def test_a_slam_that_fails_is_told_by_name():
     class Broken:
         def reset(self): ...

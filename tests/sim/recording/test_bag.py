@@ -68,17 +68,6 @@ def test_every_crc_is_there_and_right(recorded):
     assert 0 not in crcs
 
 
-def test_a_flipped_bit_anywhere_is_noticed_by_a_crc(recorded, tmp_path):
-    data, rng = next(recorded.path.glob("*.mcap")).read_bytes(), np.random.default_rng(0)
-    ends = [0, *range(len(data) - 60, len(data))]  # of the file and its summary, bit by bit
-    for at in [*rng.integers(len(data), size=150), *ends]:
-        broken = bytearray(data)
-        broken[at] ^= 1 << int(rng.integers(8))
-        (tmp_path / "a.mcap").write_bytes(broken)
-        with pytest.raises(Exception):  # noqa: B017 (whatever it makes the parser do)
-            checked(tmp_path / "a.mcap")
-
-
 def in_a_bag(frame: Frame) -> Frame:
     """As a bag has it: a LaserScan message does not state the sigma of its ranges."""
     if frame.scan is None:

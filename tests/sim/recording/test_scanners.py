@@ -13,11 +13,10 @@ from sim.recording.bag import BagWriter
 from sim.recording.dataset import Plan, read_plan
 from sim.recording.recipe import RECIPE, Recipe, read_recipe, write_recipe
 from sim.sensors.lidar.models.lms221 import Lms221Config
-from sim.simulation import Simulation, stream
+from sim.simulation import Simulation
 from sim.twins.twins import Twins
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
-from slam.logs import open_log, read_bag
-from slam.logs.carmen import write_carmen
+from slam.logs import read_bag
 
 pytestmark = pytest.mark.slow
 NAMES = ("utm30lx", "tim561", "rplidar_a1", "scanner(fov_deg=360,beams=500,rate_hz=33,sigma_m=0)")
@@ -45,20 +44,6 @@ def test_a_bag_gives_the_frames_back(tmp_path: Path, name: str) -> None:
         assert wanted.labels is not None
         np.testing.assert_array_equal(frame.labels.kind, wanted.labels.kind)
         np.testing.assert_array_equal(frame.labels.body, wanted.labels.body)
-
-
-@pytest.mark.parametrize("name", NAMES)
-def test_a_carmen_log_gives_the_scans_back(tmp_path: Path, name: str) -> None:
-    frames = list(stream("arena", seed=1, laser=f"{name}:noise", seconds=0.4))
-    write_carmen(tmp_path / "log", stream("arena", seed=1, laser=f"{name}:noise", seconds=0.4))
-    again = list(open_log(tmp_path / "log"))
-    assert len(again) == len(frames)
-    for ours, theirs in zip(again, frames, strict=True):
-        assert ours.scan is not None
-        assert theirs.scan is not None
-        known = theirs.scan.valid
-        np.testing.assert_array_equal(ours.scan.ranges[known], theirs.scan.ranges[known])
-        np.testing.assert_allclose(ours.scan.spec.angles, theirs.scan.spec.angles, atol=1e-6)
 
 
 def test_a_recipe_takes_registered_names_only(tmp_path: Path) -> None:

@@ -8,7 +8,6 @@ import numpy as np
 import pytest
 
 from sim.core.sight import Eye, hidden, view_of
-from sim.moments import toured
 from sim.recording.episode import record
 from sim.recording.recipe import Recipe
 from sim.recording.verify import regenerate
@@ -96,13 +95,6 @@ def test_it_goes_on_from_its_state_bit_for_bit() -> None:
         alone.load_state(one.save_state())
 
 
-def test_a_stream_says_that_it_has_two() -> None:
-    both = stream("arena", seconds=0.5, also_at=[BEHIND])
-    mounts = [both.metadata.laser.mount, both.metadata.others[0].laser.mount]
-    assert both.length is not None
-    assert [frame.scan.spec.mount for frame in both] == mounts * (both.length // 2)
-
-
 def test_what_cannot_be_is_refused() -> None:
     for wrong, match in (
         ([], "also_at must be a list of 1 to 7 places"),
@@ -119,10 +111,3 @@ def test_what_cannot_be_is_refused() -> None:
         Twins("arena", also_at=[BEHIND])
     with pytest.raises(InvalidValueError, match=r"Recipe.also_at and twin exclude"):
         Recipe(scene="arena", seed=0, dynamism=0.0, seconds=1.0, twin="static", also_at=[BEHIND])
-
-
-def test_a_moment_has_the_frames_of_all() -> None:
-    simulation = Simulation("arena", also_at=[BEHIND, {"y_m": 0.2, "yaw_deg": 90.0}])
-    moment = next(iter(toured(simulation, 1.0)))
-    assert [frame.scan.spec for frame in moment.frames] == list(simulation.specs)
-    assert len(simulation.specs) == 3

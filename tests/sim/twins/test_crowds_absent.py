@@ -5,11 +5,10 @@ import numpy as np
 import pytest
 
 import scenes
-from scenes.groups import group_of, groups_of, named, with_held
+from scenes.groups import with_held
 from sim.simulation import Simulation
 from sim.twins.absence import Change, apply
 from sim.twins.room import _Shapes
-from slam.errors import UnknownNameError
 
 pytestmark = pytest.mark.slow
 CROWD = "escorts:3,groups:4,boards:1,trains:1,couches:1,cleaners:1"
@@ -67,24 +66,6 @@ def test_saved_with_things_in_hand_it_goes_on_bit_for_bit(before):
     assert (again.world.people.table.held.at["qb"] >= 0).sum() >= 5
     assert drive(again, 40) == before[2]
     assert again.save_state() == before[3]
-
-
-def test_groups_have_words_patterns_and_single_names():
-    movers = scenes.build("arena", 3, crowd=CROWD, n_chairs=4, n_people=1).movers
-    groups = groups_of(movers)
-    assert groups["boards"] == ("board_pusher0", "board0")
-    assert set(groups["trains"]) == {"train_puller0", "wagon0", "wagon1"}
-    assert set(groups["couches"]) == {"couch0", "carrier0", "carrier1"}
-    assert groups["people"] == ("person0",)
-    assert len(groups["escorts"]) == 3
-    assert {m.name for m in movers} - {"robot"} == {n for of in groups.values() for n in of}
-    assert group_of(movers[-1]) == "robot"
-    assert named(movers, "escorts") == named(movers, "escort*") == groups["escorts"]
-    assert named(movers, "group[0-1]") == ("group0", "group1")
-    assert named(movers, "escort1") == ("escort1",)
-    for nobody in ("escort7", "robot", "dragons", "x*"):
-        with pytest.raises(UnknownNameError, match=r"Groups: .*escorts"):
-            named(movers, nobody)
 
 
 def test_whoever_goes_out_takes_along_what_it_holds_and_no_more():

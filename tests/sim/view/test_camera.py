@@ -15,7 +15,6 @@ from sim.view import gl
 from sim.view.camera import Camera, soften
 from slam.errors import InvalidValueError, MissingDependencyError
 from tests.built_scenes import placed
-from tests.processes import python
 
 pytestmark = pytest.mark.film
 
@@ -120,12 +119,6 @@ def test_find_asks_each_library_in_a_subprocess_and_joins_the_reasons(monkeypatc
     assert "egl: no library; osmesa: no library" in found.reason
 
 
-def test_a_clean_environment_is_left_alone(monkeypatch):
-    monkeypatch.delenv(gl.VARIABLE, raising=False)
-    monkeypatch.setattr(gl, "_try", lambda *_: pytest.fail("nothing should be run"))
-    assert gl.sanitise_environment() is None
-
-
 @pytest.mark.parametrize("value", ["nonsense", "cgl"])
 def test_a_bad_mujoco_gl_does_not_kill_the_program(value):
     """In a fresh process: the import dies without the repair, and lives with it."""
@@ -147,12 +140,6 @@ def test_a_bad_mujoco_gl_does_not_kill_the_program(value):
     assert repaired.returncode == 0, repaired.stderr
     assert f"{gl.VARIABLE}={value} is ignored" in repaired.stdout
     assert len(repaired.stdout.splitlines()) == 1
-
-
-def test_the_probe_itself_imports_no_mujoco():
-    program = "import sys, sim.view.gl; print('mujoco' in sys.modules)"
-    run = python("-c", program)
-    assert run.stdout.strip() == "False"
 
 
 CROWDED = """

@@ -7,8 +7,8 @@ import numpy as np
 import pytest
 
 import scenes
-from sim.view.draw import BLUE, INK
-from sim.view.mapview import FOOT_PX, MapView
+from sim.view.draw import BLUE
+from sim.view.mapview import MapView
 from sim.view.scans import beam_ends
 from slam.errors import InvalidValueError
 from slam.frames import Frame, LaserSpec, Odometry, Scan
@@ -94,14 +94,3 @@ def test_wrong_numbers_are_refused(office, poses):
         view.draw(poses[:-1])
     with pytest.raises(InvalidValueError, match="px"):
         MapView(scene, 0, 400)
-
-
-@pytest.mark.parametrize("size", [(640, 480), (400, 1200), (1000, 300)])
-def test_the_scale_bar_is_below_the_room(size):
-    scene = scenes.build("arena", 0)
-    view = MapView(scene, *size)
-    xmin, ymin, xmax, _ = scene.bounds
-    lowest = view.to_pixels([(xmin, ymin), (xmax, ymin)])[:, 1].max()
-    ink = (view.room[-FOOT_PX:] == INK).all(axis=2)
-    assert ink.any()
-    assert lowest < size[1] - FOOT_PX

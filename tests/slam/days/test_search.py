@@ -10,7 +10,7 @@ import pytest
 from slam import se2
 from slam.days.evidence import Snapshot
 from slam.days.history import History
-from slam.days.search import KNOWN, SPOILS, Agreement, Past, StartSearch
+from slam.days.search import KNOWN, SPOILS, Past, StartSearch
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker.belief.places import Place
 from slam.tracker.matching.matcher import unmatched
@@ -153,9 +153,3 @@ def test_what_moves_in_the_days_before_has_no_say():
     found = past(building(chair), building()).agreement(building())
     assert found.missing == 0
     assert past(building(chair), building(chair)).agreement(building()).missing > 0
-
-
-def test_without_days_there_is_nothing_to_agree_with():
-    nothing = Past(History(cell_m=CELL))
-    assert nothing.agreement(building()) == Agreement()
-    assert Agreement().disagrees == pytest.approx(0.0)

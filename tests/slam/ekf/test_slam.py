@@ -132,16 +132,6 @@ def test_exact_features_and_odometry_do_not_end_a_run(association, exact_odometr
     assert len(system.landmarks().keys) > 10
 
 
-def test_ordinary_covariances_are_taken_as_they_are():
-    frame = next(iter(PointWorld(seed=0).stream()))
-    system = EkfSlam(noise_scale=1.0)
-    system.update(frame.without_truth())
-    np.testing.assert_array_equal(
-        system.filter.landmark_covariances(),
-        0.5 * (frame.features.covariances + frame.features.covariances.transpose(0, 2, 1)),
-    )
-
-
 @pytest.mark.parametrize(("fov_deg", "known"), [(180.0, 1), (360.0, 3)])
 def test_what_lies_beyond_the_field_of_view_is_not_used(fov_deg, known):
     """Else a candidate there would be left behind in the next frame, again and again."""
@@ -185,19 +175,6 @@ def test_lost_is_said():
     assert all(e.converged for e in estimates[:21])
     assert not estimates[-1].converged
     assert estimates[-1].diagnostics["state"] == "lost"
-
-
-def test_resets_repeat_the_run():
-    world = PointWorld(PointWorldConfig(n_steps=30, moving=0.3), seed=3)
-    system = EkfSlam()
-    first, _ = run(system, world.stream())
-    keys = system.landmarks().keys
-    assert len(system.trajectory()) == 31
-    assert system.map() is None
-    system.reset()
-    again, _ = run(system, world.stream())
-    np.testing.assert_array_equal(first, again)
-    np.testing.assert_array_equal(keys, system.landmarks().keys)
 
 
 def test_identities_are_not_read():

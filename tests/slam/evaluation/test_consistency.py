@@ -65,10 +65,6 @@ def test_the_same_run_lying_elsewhere_agrees_as_well(kept: tuple[KeptScans, Floa
     assert there.apart_cm == pytest.approx(here.apart_cm, rel=1e-6)
 
 
-def test_nothing_is_said_of_a_run_without_scans() -> None:
-    assert KeptScans().judged(np.zeros((5, 3))) is None
-
-
 def test_of_two_scanners_the_scans_of_the_first_are_judged() -> None:
     front = laser(91)
     rear = replace(front, T_robot_laser=np.array([-0.3, 0.0, np.pi]))

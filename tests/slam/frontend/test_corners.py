@@ -137,14 +137,6 @@ def test_the_limits_of_view_and_range_end_nothing():
         assert len(corners(cast(wall, seed=seed)).points_robot) == 0
 
 
-def test_no_returns_make_no_corners():
-    spec = world2d.laser(181)
-    for value in (np.inf, np.nan):
-        scan = Scan(stamp_ns=7, ranges=np.full(181, value, dtype=np.float32), spec=spec)
-        features = corners(scan)
-        assert (features.stamp_ns, len(features.points_robot)) == (7, 0)
-
-
 def test_the_sweep_is_undone():
     """Turning at 2 rad/s, the odd beams of an interlaced scan come 13 ms later."""
     spec = world2d.laser(361, interlaced=True)
@@ -157,12 +149,6 @@ def test_the_sweep_is_undone():
     scan = Scan(stamp_ns=0, ranges=ranges.astype(np.float32), spec=spec)
     (undone,) = errors_to(corners(scan, twist=twist), (3.0, 1.0))
     assert np.hypot(*undone) < 0.04  # the gap between two beams there
-
-
-def test_a_scan_of_two_beams_is_survived():
-    spec = LaserSpec(n_beams=2, angle_min=0.0, angle_increment=0.01)
-    scan = Scan(stamp_ns=0, ranges=np.array([2.0, 2.0], dtype=np.float32), spec=spec)
-    assert len(corners(scan).points_robot) == 0
 
 
 def test_many_beams_without_an_answer_see_nothing_and_few_have_failed():

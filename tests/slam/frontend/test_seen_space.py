@@ -6,7 +6,6 @@ import math
 import numpy as np
 import pytest
 
-from slam.errors import InvalidValueError
 from slam.frames import LaserSpec, Scan
 from slam.frontend.seen_space import SeenSpace
 from slam.system import Raster
@@ -70,10 +69,3 @@ def test_a_fan_of_lost_beams_and_what_is_behind_a_window_stay_unknown():
     columns = np.nonzero(values.values == 0.0)[1]
     far = columns * values.resolution_m + values.T_map_origin[0] > 3.1
     assert far.sum() * values.resolution_m**2 < 0.1
-
-
-def test_nothing_seen_changes_nothing():
-    raster = blank()
-    assert SeenSpace().merge(raster) is raster
-    with pytest.raises(InvalidValueError, match="resolution_m"):
-        SeenSpace(0.0)

@@ -11,8 +11,7 @@ from pathlib import Path
 import pytest
 
 from slam.errors import SlamFailedError
-from slam.guests.wire import MARK as MARK_OF_WORKERS
-from slam.guests.wire import Wire, guarded_workers
+from slam.guests.wire import Wire
 from tests.processes import processes_with
 
 pytestmark = [
@@ -141,31 +140,3 @@ def test_a_guest_gets_its_environment_and_signals_as_they_are():
     ignored = int(wire.ask(b"", 10.0).split()[1], 16)
     assert not ignored & (1 << signal.SIGPIPE - 1 | 1 << signal.SIGTERM - 1)
     wire.close()
-
-
-def start_marked_and_not() -> None:
-    """What the program of the next test does."""
-    before = os.environ.get(MARK_OF_WORKERS)
-    with guarded_workers():
-        marked = subprocess.Popen(["sleep", "300"], start_new_session=True)
-    assert os.environ.get(MARK_OF_WORKERS) == before
-    other = subprocess.Popen(["sleep", "300"], start_new_session=True)
-    print(marked.pid, other.pid, flush=True)
-    time.sleep(300)
-
-
-def test_what_is_started_while_workers_are_guarded_ends_with_a_killed_mobilia():
-    code = "from tests.slam.guests.test_guard import start_marked_and_not; start_marked_and_not()"
-    repository = Path(__file__).resolve().parents[3]
-    environment = {**os.environ, MARK: "workers"}
-    with subprocess.Popen(
-        [sys.executable, "-c", code], stdout=subprocess.PIPE, cwd=repository, env=environment
-    ) as mobilia:
-        marked, other = (int(word) for word in mobilia.stdout.readline().split())
-        mobilia.kill()
-    deadline = time.monotonic() + 10.0
-    while (left := processes_with(MARK, "workers")) != [other]:  # its guard has gone too
-        assert time.monotonic() < deadline, (left, marked)
-        time.sleep(0.01)
-    os.kill(other, signal.SIGKILL)
-    none_left("workers")

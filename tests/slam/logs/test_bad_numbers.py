@@ -2,7 +2,6 @@
 """Whatever number a log has, it ends in frames or in an error: file, line, field, value."""
 
 import math
-import random
 import re
 import struct
 
@@ -97,41 +96,28 @@ PLACES = [  # format, line from 0, word from 0, what the error calls it
     ("flaser", 2, 1, "number of beams"),
     ("flaser", 2, 4, "range 2"),
     ("flaser", 2, 7, "x of the laser"),
-    ("flaser", 2, 12, "theta of the robot"),
     ("flaser", 2, 13, "time"),
     ("robotlaser", 1, 2, "start angle"),
-    ("robotlaser", 1, 4, "angular step"),
     ("robotlaser", 1, 5, "maximum range"),
-    ("robotlaser", 1, 9, "range 0"),
     ("robotlaser", 1, 16, "remission 1"),
     ("robotlaser", 1, 31, "time"),
     ("rawlaser", 2, 2, "y of the robot"),
-    ("rawlaser", 2, 7, "time"),
     ("rawlaser", 3, 10, "range 1"),
-    ("rawlaser", 9, 1, "x of the robot"),
     ("reading", 1, 3, "range 1"),
     ("reading", 1, 7, "theta of the robot"),
-    ("reading", 1, 8, "time"),
     ("parameters", 0, 2, "PARAM robot_frontlaser_offset"),
-    ("parameters", 1, 2, "PARAM robot_front_laser_max"),
     ("centimetre", 1, 2, "y of the robot"),
-    ("centimetre", 1, 4, "x of the laser"),
     ("centimetre", 1, 8, "range 1"),
     ("centimetre", 2, 4, "time"),
     ("ticks", 1, 0, "time: expected a number in column 1"),
-    ("ticks", 1, 3, "right: expected a number in column 4"),
     ("ticks", 1, 5, "range: expected a number in column 6"),
-    ("poses", 1, 1, "x: expected a number in column 2"),
     ("poses", 1, 3, "theta: expected a number in column 4"),
     ("trunks", 1, 0, "time"),
-    ("trunks", 1, 1, "range"),
     ("trunks", 1, 2, "bearing"),
     ("controls", 1, 1, "speed"),
-    ("controls", 1, 2, "steering angle"),
     ("graph", 0, 4, "dy"),
     ("graph", 1, 5, "sxx"),
     ("gps", 1, 0, "time"),
-    ("gps", 1, 2, "y"),
 ]
 
 
@@ -177,51 +163,6 @@ def test_what_only_the_frames_refuse_is_named_too(tmp_path, name, old, new, fiel
         LogFormatError, match=re.escape(f"{path}:") + rf"\d+: .*{field}.*got|is not"
     ):
         read()
-
-
-WORDS = ["nan", "inf", "-1", "0", "1e9", "1e300", "-1e-320", "4.29497e+09", "x", "1_0", "9" * 400]
-
-
-def mutated(rng, row, mark):
-    words = row.rstrip("\n").split(mark)
-    at = rng.randrange(len(words))
-    match rng.randrange(4):
-        case 0:
-            words[at] = rng.choice(WORDS)
-        case 1:
-            del words[at]
-        case 2:
-            words.insert(at, rng.choice(WORDS))
-        case _:
-            cut = rng.randrange(len(words[at]) + 1)
-            words[at] = words[at][:cut] + rng.choice("0.9-e,#\t") + words[at][cut + 1 :]
-    return mark.join(words) + "\n"
-
-
-def refusal(read):
-    """What the error says; None where there are frames."""
-    try:
-        assert read()
-    except LogFormatError as error:
-        return str(error)
-    return None
-
-
-def test_200_mutated_lines_end_in_frames_or_are_named(tmp_path):
-    rng = random.Random(28)
-    refused = 0
-    for _ in range(200):
-        name = rng.choice(list(ROWS))
-        rows = ROWS[name]()
-        line = rng.randrange(len(rows))
-        rows[line] = mutated(rng, rows[line], "," if name == "poses" else " ")
-        path, read = made(tmp_path, name, rows)
-        said = refusal(read)
-        if said is not None:
-            refused += 1
-            assert re.match(re.escape(str(path)) + r":\d+: ", said), (name, rows[line], said)
-        path.unlink()
-    assert 50 < refused < 190
 
 
 START, MS = 1_400_000_000_000_000_000, 1_000_000

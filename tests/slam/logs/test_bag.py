@@ -1,9 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Anybody's bag: topics at their own rates, scanners mounted anyhow, and every kind of damage."""
 
-import logging
 import math
-import time
 from contextlib import suppress
 from pathlib import Path
 from typing import Any
@@ -61,14 +59,6 @@ def test_odometry_is_interpolated_to_each_scan_in_every_format(tmp_path, kind):
     assert all(np.isfinite(slam.update(frame).T_map_robot).all() for frame in frames)
 
 
-def test_a_single_storage_file_is_a_bag_too(tmp_path):
-    make = bags.Maker()
-    for storage, suffix in (("mcap", ".mcap"), ("sqlite3", ".db3")):
-        folder = bags.write_ros2(tmp_path / storage, drive(make), storage)
-        (file,) = folder.glob(f"*{suffix}")
-        assert read(file) == read(folder)
-
-
 def test_beams_of_a_clockwise_scanner_are_turned_round(tmp_path):
     make = bags.Maker()
     changes = {"angle_min": 1.0, "angle_max": -1.0, "angle_increment": -0.5}
@@ -91,29 +81,12 @@ def test_a_scanner_that_hangs_upside_down_sees_left_as_right(tmp_path):
     assert frame.scan.intensities.tolist() == [4.0, 3.0, 2.0, 1.0, 0.0]
 
 
-def test_beam_times_follow_from_the_time_increment(tmp_path):
-    path = bags.write_ros2(tmp_path / "a", drive(bags.Maker(), time_increment=0.002))
-    offsets = read(path)[0].scan.spec.beam_time_offsets
-    np.testing.assert_allclose(offsets, 0.002 * np.arange(5), atol=1e-9)
-
-
 def test_negative_ranges_become_error_codes(tmp_path):
     changes = {"ranges": np.array([-math.inf, -1.0, 1.0, math.inf, math.nan], dtype=np.float32)}
     frame = read(bags.write_ros2(tmp_path / "a", drive(bags.Maker(), **changes)))[0]
     np.testing.assert_array_equal(
         frame.scan.ranges, np.float32([math.nan, math.nan, 1.0, math.inf, math.nan])
     )
-
-
-def test_scans_of_nothing_but_nan_are_read_and_survived(tmp_path):
-    changes = {"ranges": np.full(5, np.nan, dtype=np.float32)}
-    frames = read(bags.write_ros2(tmp_path / "a", drive(bags.Maker(), **changes)))
-    assert len(frames) == 5
-    slam = create("shunting")
-    for frame in frames:
-        estimate = slam.update(frame)
-    driven = se2.between(frames[0].odometry.T_odom_robot, frames[-1].odometry.T_odom_robot)
-    np.testing.assert_allclose(estimate.T_map_robot, driven, atol=0.01)
 
 
 def test_topics_are_guessed_and_can_be_named(tmp_path):
@@ -157,36 +130,6 @@ def test_a_bag_without_scans_or_the_odometry_asked_for_says_what_it_has(tmp_path
         read(bags.write_ros2(tmp_path / "d", apart))
 
 
-def test_scans_out_of_order_or_without_odometry_are_left_out(tmp_path, caplog):
-    make = bags.Maker()
-    messages = drive(make)
-    messages.insert(0, make.scan(START - 500 * MS, RANGES))
-    messages.append((*make.scan(START + 107 * MS, RANGES)[:2], START + 900 * MS,
-                     make.scan(START + 107 * MS, RANGES)[3]))  # fmt: skip
-    with caplog.at_level(logging.WARNING):
-        frames = read(bags.write_ros2(tmp_path / "a", messages))
-    assert len(frames) == 5
-    assert "2 scans outside the odometry's time, or with another's" in caplog.text
-    with pytest.raises(LogFormatError, match="1 scans with the time of another"):
-        read_bag(tmp_path / "a", strict=True)
-
-
-@pytest.mark.parametrize(
-    "changes",
-    [
-        {"angle_increment": 0.0},
-        {"angle_increment": math.nan},
-        {"range_max": 0.0},
-        {"time_increment": 1e9},
-        {"ranges": np.zeros(0, dtype=np.float32)},
-    ],
-)
-def test_an_impossible_scanner_is_an_error(tmp_path, changes):
-    path = bags.write_ros2(tmp_path / "a", drive(bags.Maker(), **changes))
-    with pytest.raises(LogFormatError, match="topic /scan, message 1: "):
-        read_bag(path)
-
-
 def test_accumulated_covariances_give_back_those_of_the_increments():
     rng = np.random.default_rng(4)
     pose, P = np.array([1.0, -2.0, 0.4]), np.diag([0.1, 0.2, 0.05])
@@ -226,10 +169,8 @@ def test_a_chain_of_many_transforms_is_refused_by_their_number(tmp_path, a_messa
     del links[30_000 // a_message :]
     driven = drive(make)[1:]
     path = bags.write_ros2(tmp_path / "a", driven + links if scans_first else links + driven)
-    began = time.perf_counter()
     with pytest.raises(LogFormatError, match=r"more than 2000 transforms between frames"):
         read_bag(path)
-    assert time.perf_counter() - began < 20.0  # it was minutes
 
 
 @pytest.mark.parametrize("n", [1, 2, 300, 1999])
@@ -274,14 +215,3 @@ def test_truncated_anywhere_is_one_clear_error_or_a_shorter_log(tmp_path, kind):
         assert before <= found[False] <= 20
         before = found[False]
     assert before > 5
-
-
-def test_what_is_no_bag_is_refused(tmp_path):
-    (tmp_path / "metadata.yaml").write_text("rosbag2_bagfile_information: [1, {}]\n")
-    with pytest.raises(LogFormatError):
-        open_log(tmp_path)
-    (tmp_path / "a.mcap").write_bytes(b"hello")
-    with pytest.raises(LogFormatError, match=r"a\.mcap"):
-        read_bag(tmp_path / "a.mcap")
-    with pytest.raises(LogFormatError, match="no such file"):
-        read_bag(tmp_path / "b.mcap")

@@ -221,12 +221,3 @@ def test_two_robots_on_one_topic_of_odometry_are_told_apart(tmp_path):
     stream = check(read_bag(path))
     assert stream.metadata.extra["odometry"] == "/odom:a/base"
     assert stream.metadata.extra["passed_over"] == ["/odom:b/base"]
-
-
-def test_first_echoes_are_the_ranges(tmp_path):
-    make = bags.Maker()
-    beams = [[1.0, 1.2], [2.0], [], [math.inf, 3.0], [2.5, 9.0]]
-    path = bags.write_ros2(tmp_path / "a", [make.echoes(START + k * MS, beams) for k in range(3)])
-    stream = read_bag(path)
-    assert next(iter(stream)).scan.ranges.tolist() == [1.0, 2.0, math.inf, math.inf, 2.5]
-    assert stream.metadata.extra["echoes"] == "first echo of each beam"

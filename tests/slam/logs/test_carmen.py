@@ -12,7 +12,6 @@ from slam import Frame, LaserSpec, Odometry, Scan, Stream, StreamMetadata, se2
 from slam.errors import InvalidValueError, LogFormatError
 from slam.frames import to_ns
 from slam.logs import open_log, read_carmen, write_carmen
-from slam.logs.repairs import Repairs, put_in_order
 
 
 def read(tmp_path, text, name="a.log"):
@@ -154,28 +153,6 @@ def test_of_several_scan_messages_one_is_read_and_the_others_counted(tmp_path, c
     assert stream.metadata.extra["ignored"] == {"RAWLASER1": 3}
 
 
-def test_small_steps_back_are_sorted_and_counted(tmp_path, carmen_text):
-    poses = carmen_text.path_poses(4)
-    stamps = [10.0, 11.0, 10.2, 12.0]
-    text = "".join(carmen_text.flaser(k, stamps[k], poses[k], poses[k]) for k in range(4))
-    stream = read(tmp_path, text)
-    assert [frame.stamp for frame in stream] == [10.0, 10.2, 11.0, 12.0]
-    np.testing.assert_allclose(odometry(stream)[1], poses[2], atol=1e-6)
-    assert stream.metadata.extra["stamps_stepped_back"] == 1
-    with pytest.raises(LogFormatError, match=r"a\.log:3: time steps back by 0.8 s"):
-        read_carmen(tmp_path / "a.log", strict=True)
-
-
-def test_equal_stamps_are_spread_to_the_next_later_one(tmp_path):
-    lines = list(range(7))
-    ordered = put_in_order(tmp_path, [100, 100, 100, 100, 500, 900, 900], lines)
-    assert ordered.stamps_ns == [100, 200, 300, 400, 500, 900, 1300]
-    crowded = put_in_order(tmp_path, [5, 5, 5, 6, 6], range(5)).stamps_ns
-    assert all(b > a for a, b in pairwise(crowded))
-    with pytest.raises(LogFormatError, match="199 scans have the time of another"):
-        put_in_order(tmp_path, [0] * 200, range(200), repairs=Repairs(tmp_path, strict=True))
-
-
 def test_ranges_at_the_maximum_are_no_return_and_zero_is_an_error_code(tmp_path, carmen_text):
     text = carmen_text.plain_log(4).replace(" 2.07 ", " 0 ").replace(" 2.14 ", " 30.0 ")
     stream = read(tmp_path, "PARAM robot_front_laser_max 30.0 nohost 0\n" + text)
@@ -251,24 +228,6 @@ def short_odom(line):
     """``ODOM x y theta t``, as particle filters write it."""
     words = line.split()
     return " ".join([*words[:4], words[-3]]) + "\n"
-
-
-def test_odom_without_speeds_is_read_and_counted(tmp_path, carmen_text, caplog):
-    poses = carmen_text.path_poses(7)
-    log = [carmen_text.odom(k + 0.5, pose) for k, pose in enumerate(poses)]
-    scans = [carmen_text.rawlaser(k, k) for k in range(1, 7)]
-    long = [line for both in zip(log, [*scans, ""], strict=True) for line in both]
-    short = [short_odom(line) if line.startswith("ODOM") else line for line in long]
-    first, second = read(tmp_path, "".join(long)), read(tmp_path, "".join(short))
-    np.testing.assert_array_equal(odometry(first), odometry(second))
-    assert second.metadata.extra["odom_lines_without_speeds"] == 7
-    assert "odom_lines_without_speeds" not in first.metadata.extra
-    assert "7 ODOM lines without speeds" in caplog.text
-    with pytest.raises(LogFormatError, match="ODOM lines have 5 words"):
-        read_carmen(tmp_path / "a.log", strict=True)
-    for mixed, expected in (([*short, log[0]], 5), ([*long, short[0]], 10)):
-        with pytest.raises(LogFormatError, match=f"ODOM has {expected} words"):
-            read(tmp_path, "".join(mixed))
 
 
 @pytest.mark.parametrize("at", [0, 1, 6])

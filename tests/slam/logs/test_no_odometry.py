@@ -66,14 +66,6 @@ def test_a_hand_held_bag_of_ros_1_is_followed(bag, caplog):
         open_log(path, strict=True)
 
 
-def test_read_alone_the_frames_stand_still_and_claim_little(bag):
-    given = list(open_log(bag[0]))
-    assert all((f.odometry.T_odom_robot == 0.0).all() for f in given)
-    assert given[0].odometry.increment_covariance is None
-    walked = 0.9 * 0.05
-    assert math.sqrt(given[1].odometry.increment_covariance[0, 0]) > walked
-
-
 def test_the_motion_goes_on_as_it_was():
     prior = ConstantVelocity()
     frame = carried(0.2)[0]

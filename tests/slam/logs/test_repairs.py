@@ -9,7 +9,7 @@ import pytest
 
 from slam.errors import LogFormatError
 from slam.logs import open_log, read_carmen
-from slam.logs.repairs import CLOCK_STEPS, STRAY_STAMPS, Repairs, continued, digits_of, put_in_order
+from slam.logs.repairs import CLOCK_STEPS, STRAY_STAMPS, Repairs, continued, put_in_order
 
 S = 1_000_000_000
 
@@ -41,11 +41,6 @@ def test_a_step_that_only_the_rounding_made_is_none(tmp_path):
     stamps = seconds(1000, 1001, 1003, 1002, 1004)
     assert continued(stamps, range(5), repairs, digits=4) == stamps
     assert not repairs.counts
-
-
-def test_printed_digits():
-    words = {"1.13486e+09": 6, "1134863807.658747": 16, "0.500000": 6, "2683.8": 5, "-12": 2}
-    assert {word: digits_of(word) for word in words} == words
 
 
 def test_many_equal_stamps_are_spread_by_the_steps_between(tmp_path):

@@ -104,19 +104,14 @@ def test_without_odometry_it_is_that_of_a_constant_velocity(tmp_path, caplog):
     ("old", "new", "match"),
     [
         ("column = 1", "column = 0", r"time.column must be a whole number from 1 .*, got 0"),
-        ("column = 1", "column = true", "time.column must be a whole number"),
         ("column = 1", "kolumns = 1", "time: unknown key 'kolumns'; known: column"),
         ('unit = "us"', 'unit = "hours"', "time.unit must be one of ms, ns, s, us, got 'hours'"),
-        ("counter = 65536", "count = 65536", "odometry: unknown key 'count'; known: left"),
-        ("track = 33.0", "track = inf", "odometry.track must be a number from"),
         ("track = 33.0", "track = 0", "odometry.track must be a number from"),
         ("step_deg = 30.0", "step_deg = 0", "must not be 0"),
-        ("beams = 5", "beams = 1000000", "scan.beams must be a whole number from 0 to"),
         ("range_max = 4000", "", "scan.range_max must be a number .*got nothing"),
         ("[scan]", "[scans]", "unknown key 'scans'; known: time, scan"),
         ("[laser]", "[laser", "is no TOML"),
         ("[time]", 'separator = "ab"\n[time]', "separator must be a word that"),
-        ("[laser]", "[lidar]", "unknown key 'lidar'"),
     ],
 )
 def test_a_wrong_description_names_its_key(tmp_path, old, new, match):
@@ -179,13 +174,3 @@ def test_cells_without_a_range_are_no_returns(tmp_path):
     assert np.isinf(found[:2]).all()
     assert np.isnan(found[2:7]).all()
     assert found[7] == 4.0
-
-
-@pytest.mark.parametrize("cell", ["", "nan", "inf", "x"])
-@pytest.mark.parametrize("column", [0, 1, 3])
-def test_times_and_poses_stay_strict(tmp_path, cell, column):
-    cells = ["1", "0", "0", "0", "1", "2", "3"]
-    cells[column] = cell
-    path, how = write(tmp_path, POSES, f"0,0,0,0,1,2,3\n{','.join(cells)}\n")
-    with pytest.raises(LogFormatError, match=r"a\.txt:2: .*expected a number"):
-        list(read_rover(path, how))

@@ -5,13 +5,11 @@ import math
 from dataclasses import replace
 from itertools import pairwise
 from pathlib import Path
-from typing import Any
 
 import numpy as np
 import pytest
 
-import tests.slam.logs.foreign_bags as bags
-from slam import create, se2
+from slam import se2
 from slam.errors import InvalidValueError
 from slam.frames import Frame, Stream, StreamMetadata
 from slam.logs import read_bag
@@ -68,20 +66,6 @@ def test_a_covariance_of_odometry_is_that_of_the_step_between_frames() -> None:
     assert both.length == len(merged) == len(made)
     for frame in merged[2:]:  # each had that of two steps
         np.testing.assert_allclose(frame.odometry.increment_covariance, known / 2.0)
-
-
-def test_shunting_knows_the_room_by_both_and_better_than_by_the_rear_alone(tmp_path: Path) -> None:
-    path = bag(tmp_path / "two")
-    poses: list[Any] = []
-    for stream in (read(path), list(read_bag(path, scan="/rear"))):
-        slam = create("shunting")
-        estimates = [slam.update(frame) for frame in stream]
-        assert all(estimate.converged for estimate in estimates)
-        t = (stream[-1].stamp_ns - bags.START_NS) * 1e-9
-        start = WAY.at((stream[0].stamp_ns - bags.START_NS) * 1e-9)[0]
-        off = se2.between(start, WAY.at(t)[0]) - estimates[-1].T_map_robot
-        poses.append(math.hypot(off[0], off[1]))
-    assert max(poses) < 0.02
 
 
 def test_odometry_that_one_of_them_has_not_is_none() -> None:

@@ -13,8 +13,7 @@ from numpy.typing import NDArray
 import slam
 from slam import se2
 from slam._jit import COMPILING
-from slam.errors import InvalidValueError
-from slam.frames import Frame, Odometry, Scan
+from slam.frames import Frame, Scan
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from tests.world2d import Chairs, Drive, World2D, arena, frames, going_on, laser, rectangle, wander
 
@@ -149,20 +148,6 @@ def test_the_covariance_is_of_the_size_of_the_error() -> None:
     assert 0.05 < float(np.mean(normalised)) < 2.0
 
 
-def test_a_corridor_leaves_the_way_along_it_uncertain() -> None:
-    stream = frames(
-        World2D(rectangle(-60.0, -1.0, 60.0, 1.01)),
-        Drive((0.0, 0.0, 0.0), ((0.6, 0.0, 10.0),)),
-        rate_hz=5.0,
-        spec=laser(181),
-        seed=1,
-    )
-    system = ShuntingSlam(FAST)
-    for frame in stream:
-        covariance = system.update(frame).covariance
-    assert covariance[0, 0] > 8.0 * covariance[1, 1]
-
-
 def test_the_map_shows_the_walls_once() -> None:
     stream = frames(World2D(arena(phase=0.0)), wander(1.0), rate_hz=5.0, seed=8)[:100]
     system = ShuntingSlam(FAST)
@@ -176,36 +161,6 @@ def test_the_map_shows_the_walls_once() -> None:
     to_wall = np.minimum(np.abs(np.abs(x) - 5.01), np.abs(np.abs(y) - 3.99))
     pillar = (x > 3.3) & (x < 4.1) & (y > 1.4) & (y < 2.2)
     assert (to_wall[~pillar] < 0.08).mean() > 0.99
-
-
-def test_wrong_input_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match="'robust' or 'paper'"):
-        ShuntingSlam("fast")
-    stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(31))[:2]
-    system = ShuntingSlam(FAST)
-    system.update(stream[1])
-    with pytest.raises(InvalidValueError, match="order"):
-        system.update(stream[0])
-    bare = Frame(stamp_ns=10**10, odometry=Odometry(stamp_ns=10**10, T_odom_robot=np.zeros(3)))
-    with pytest.raises(InvalidValueError, match="scan or features"):
-        system.update(bare)
-
-
-def test_a_scan_without_a_single_return_is_survived() -> None:
-    stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(31))[:3]
-    system = ShuntingSlam(FAST)
-    for frame in stream:
-        assert frame.scan is not None
-        empty = Scan(
-            stamp_ns=frame.stamp_ns,
-            ranges=np.full(31, np.inf, np.float32),
-            spec=frame.scan.spec,
-        )
-        estimate = system.update(
-            Frame(stamp_ns=frame.stamp_ns, odometry=frame.odometry, scan=empty)
-        )
-        assert np.isfinite(estimate.covariance).all()
-    assert system.map() is None
 
 
 def test_no_frame_waits_for_the_compiler() -> None:
@@ -237,15 +192,3 @@ def test_no_frame_waits_for_the_compiler() -> None:
         event.unregister(COMPILING, listener)
     assert searched
     assert compiled == []
-
-
-def test_the_ordinary_grid_drives_too_and_remembers_what_is_free() -> None:
-    stream = frames(World2D(arena()), wander(1.0), rate_hz=5.0, spec=laser(181), seed=8)[:60]
-    system = slam.create("occupancy", cell_m=0.05)
-    assert rms(errors(system, stream)[:, :2]) < 0.05
-    raster = system.map()
-    assert raster is not None
-    column = round((1.0 - raster.T_map_origin[0]) / raster.resolution_m)
-    row = round(-raster.T_map_origin[1] / raster.resolution_m)
-    assert raster.values[row, column] < 0.1  # 1 m ahead of the start
-    assert np.nanmax(raster.values) > 0.9

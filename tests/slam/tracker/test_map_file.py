@@ -1,12 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 """A map written and read back is the same map, and whatever is no map is refused by name."""
 
-import io
 import json
-import math
-import zipfile
 from pathlib import Path
-from typing import IO, Any
+from typing import Any
 
 import numpy as np
 import pytest
@@ -61,9 +58,7 @@ def test_round_trip_is_exact(saved: tuple[Path, ShuntingSlam, list[Frame]], tmp_
     assert len(back.trajectory()) == 0
 
 
-def test_a_loaded_map_is_localised_in_at_once(
-    saved: tuple[Path, ShuntingSlam, list[Frame]],
-) -> None:
+def test_a_loaded_map_is_localised_in_at_once(saved: tuple[Path, ShuntingSlam, list[Frame]]):
     """The next day: odometry and clock start anew, the robot was nudged by 8 cm and 3 degrees."""
     path, _, stream = saved
     assert stream[0].truth is not None
@@ -77,9 +72,7 @@ def test_a_loaded_map_is_localised_in_at_once(
         np.testing.assert_allclose(estimate.T_map_robot, frame.truth, atol=0.03)
 
 
-def test_a_robot_that_was_carried_off_finds_itself_in_the_loaded_map(
-    saved: tuple[Path, ShuntingSlam, list[Frame]],
-) -> None:
+def test_a_robot_that_was_carried_off_finds_itself_in_the_loaded_map(saved):
     slam = ShuntingSlam.load(saved[0])
     drive = Drive((3.0, 2.5, -1.0), ((0.2, 0.3, 4.0),))
     for frame in frames(ROOMS, drive, rate_hz=5.0, seed=9):
@@ -118,51 +111,26 @@ def rewritten(source: Path, target: Path, **changes: Any) -> Path:
     [
         ({"version": 3}, "version 3 of a mobilia shunting memory; 1 and 2 are known"),
         ({"version": 2}, "extra must name arrays"),
-        ({"extra": []}, "its header has 'extra'"),
         ({"format": "somebody's"}, "not a mobilia shunting memory"),
         ({"config": {"cell_m": -1.0}}, "cell_m"),
-        ({"config": {"cellm": 0.05}}, "cellm"),
         ({"state": {}}, "T_map_robot"),
         ({"places": np.zeros((1, 2), np.int64)}, "x must be finite float32"),
-        ({"x": np.zeros(0, np.float64)}, "x must be finite float32"),
         ({"x": np.float32(1.5)}, r"x must lie in \[0, 1\]"),
-        ({"y": np.float32(-0.5)}, r"y must lie in \[0, 1\]"),
-        ({"age": np.float32(-1.0)}, "age must lie in"),
         ({"places": np.int64(2**62)}, "places must lie within"),
         ({"somebody": 1}, "its header has 'somebody'"),
         ({"sha256": "0" * 64}, "its content is not what was written"),
     ],
 )
-def test_what_is_no_such_file_is_refused(
-    saved: tuple[Path, ShuntingSlam, list[Frame]],
-    tmp_path: Path,
-    changes: dict[str, Any],
-    match: str,
-) -> None:
+def test_what_is_no_such_file_is_refused(saved, tmp_path, changes, match):
     path = rewritten(saved[0], tmp_path / "changed.npz", **changes)
     with pytest.raises(LogFormatError, match=match) as caught:
         ShuntingSlam.load(path)
     assert str(path) in str(caught.value)
 
 
-def test_missing_cut_and_foreign_files_are_refused(
-    saved: tuple[Path, ShuntingSlam, list[Frame]], tmp_path: Path
-) -> None:
-    data = saved[0].read_bytes()
-    broken = bytearray(data)
-    broken[len(data) // 2] ^= 0xFF
-    for name, content in (
-        ("cut.npz", data[: len(data) // 2]),
-        ("cut2.npz", data[:-30]),
-        ("empty.npz", b""),
-        ("broken.npz", bytes(broken)),
-        ("map.png", b"\x89PNG\r\n\x1a\n" + bytes(100)),
-    ):
-        (tmp_path / name).write_bytes(content)
-        with pytest.raises(LogFormatError, match=name):
-            ShuntingSlam.load(tmp_path / name)
-    np.save(tmp_path / "array.npy", np.zeros(3))
-    for name in ("array.npy", "missing.npz"):
+def test_cut_and_foreign_files_are_refused(saved, tmp_path):
+    (tmp_path / "cut.npz").write_bytes(saved[0].read_bytes()[:-30])
+    for name in ("cut.npz", "missing.npz"):
         with pytest.raises(LogFormatError, match=name):
             ShuntingSlam.load(tmp_path / name)
     with pytest.raises(LogFormatError, match="a map of ShuntingSlam, not of OccupancySlam"):
@@ -172,42 +140,7 @@ def test_missing_cut_and_foreign_files_are_refused(
         saved[1].save(tmp_path / "file" / "map.npz")
 
 
-def test_every_flipped_byte_and_every_cut_is_noticed_or_changes_nothing(tmp_path: Path) -> None:
-    stream = frames(ROOMS, wander(1.0), rate_hz=5.0, spec=laser(19), seed=7)[:2]
-    slam = ShuntingSlam(CONFIG)
-    for frame in stream:
-        slam.update(frame.without_truth())
-    path = tmp_path / "small.npz"
-    slam.save(path)
-    data, (config, state, arrays) = path.read_bytes(), memory.read(path, ShuntingConfig)
-    again = tmp_path / "again.npz"
-    slam.save(again)
-    assert again.read_bytes() == data
-    rng = np.random.default_rng(0)
-    # all of the archive's own words at the end, some of the rest
-    flips = [*rng.integers(0, len(data), 150).tolist(), *range(len(data) - 150, len(data))]
-    damaged = [data[:k] + bytes([data[k] ^ 1 << k % 8]) + data[k + 1 :] for k in flips]
-    damaged += [data[:k] for k in rng.integers(0, len(data), 50).tolist()]
-    noticed = 0
-    for broken in damaged:
-        path.write_bytes(broken)
-        try:
-            found = memory.read(path, ShuntingConfig)
-        except LogFormatError:
-            noticed += 1
-            continue
-        assert (found[0], found[1].kind) == (config, state.kind)
-        np.testing.assert_array_equal(found[1].T_map_robot, state.T_map_robot)
-        for name, array in arrays.items():
-            np.testing.assert_array_equal(found[2][name], array)
-    assert noticed > 250
-
-
-def test_a_map_of_before_sums_is_read_and_said_so(
-    saved: tuple[Path, ShuntingSlam, list[Frame]],
-    tmp_path: Path,
-    caplog: pytest.LogCaptureFixture,
-) -> None:
+def test_a_map_of_before_sums_is_read_and_said_so(saved, tmp_path, caplog):
     path = rewritten(saved[0], tmp_path / "older.npz")
     back = ShuntingSlam.load(path)
     assert back.cell_map.extent() == saved[1].cell_map.extent()
@@ -215,12 +148,7 @@ def test_a_map_of_before_sums_is_read_and_said_so(
 
 
 @pytest.mark.parametrize(("freeze_below", "carried_per_h"), [(0.6, None), (0.0, 0.0)])
-def test_a_map_of_before_one_belief_is_read(
-    saved: tuple[Path, ShuntingSlam, list[Frame]],
-    tmp_path: Path,
-    freeze_below: float,
-    carried_per_h: float | None,
-) -> None:
+def test_a_map_of_before_one_belief_is_read(saved, tmp_path, freeze_below, carried_per_h):
     """What it says of mechanisms that are gone is passed over, but whether a pose is doubted."""
     path, slam, stream = saved
     with np.load(path) as archive:
@@ -250,9 +178,7 @@ def test_a_map_of_before_one_belief_is_read(
         ShuntingSlam.load(rewritten(path, tmp_path / "typo.npz", config=config))
 
 
-def test_a_map_of_before_shares_were_weighed_is_read(
-    saved: tuple[Path, ShuntingSlam, list[Frame]], tmp_path: Path
-) -> None:
+def test_a_map_of_before_shares_were_weighed_is_read(saved, tmp_path):
     with np.load(saved[0]) as archive:
         config = json.loads(str(archive["header"]))["config"]
     for number in ("again", "best", "far_m", "hidden", "hidden_m", "known", "more_m", "new"):
@@ -268,37 +194,7 @@ def test_a_map_of_before_shares_were_weighed_is_read(
     assert back.config == CONFIG.changed({"belief.frozen_above": 0.02})
 
 
-def test_a_small_file_that_unpacks_to_very_much_is_refused(
-    saved: tuple[Path, ShuntingSlam, list[Frame]], tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
-    monkeypatch.setattr(memory, "MAX_BYTES", 1 << 25)
-    path = tmp_path / "bomb.npz"
-    with np.load(saved[0]) as archive:
-        header = archive["header"]
-    with zipfile.ZipFile(path, "w", zipfile.ZIP_DEFLATED, compresslevel=1) as archive:
-        archive.writestr("header.npy", _npy(header))
-        for name in ("places", "x", "y", "age", "facing"):
-            with archive.open(f"{name}.npy", "w", force_zip64=True) as member:
-                if name == "x":
-                    _write_zeros(member, (1 << 18, 8, 8))  # 64 MiB
-                else:
-                    member.write(_npy(np.zeros(0)))
-    assert path.stat().st_size < 1 << 20
-    with pytest.raises(
-        LogFormatError, match=r"bomb\.npz: unpacks to 671.* bytes; at most 33554432"
-    ):
-        ShuntingSlam.load(path)
-
-
-def _npy(array: np.ndarray[Any, Any]) -> bytes:
-    file = io.BytesIO()
-    np.save(file, array)
-    return file.getvalue()
-
-
-def _write_zeros(member: IO[bytes], shape: tuple[int, ...]) -> None:
-    np.lib.format.write_array_header_1_0(
-        member, {"descr": "<f4", "fortran_order": False, "shape": shape}
-    )
-    for _ in range(4 * math.prod(shape) >> 24):
-        member.write(bytes(1 << 24))
+def test_a_file_that_unpacks_to_too_much_is_refused(saved, monkeypatch):
+    monkeypatch.setattr(memory, "MAX_BYTES", 1 << 12)
+    with pytest.raises(LogFormatError, match=r"rooms\.npz: unpacks to \d+ bytes; at most 4096"):
+        ShuntingSlam.load(saved[0])

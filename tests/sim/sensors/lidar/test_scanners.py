@@ -14,7 +14,7 @@ from sim.sensors.lidar import registry
 from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.sensors.lidar.registry import scanner_of
-from sim.sensors.lidar.scanner import Band, Scanner
+from sim.sensors.lidar.scanner import Scanner
 from sim.simulation import Simulation, stream, tour
 from slam.errors import InvalidValueError, UnknownNameError
 from slam.frames import Frame
@@ -34,9 +34,7 @@ def turning(
 
 
 @pytest.mark.parametrize("name", MODELS)
-def test_bearings_on_a_turning_robot_are_those_of_each_beams_own_time(
-    room: SimpleNamespace, name: str
-) -> None:
+def test_bearings_on_a_turning_robot_are_those_of_each_beams_own_time(room, name):
     """The walls are at 4 m; the laser is 2 cm ahead of the axis. A scan begins k / rate after the
     first, also between two physics steps."""
     model, omega = scanner_of(name).scanner(), 1.2
@@ -64,9 +62,7 @@ def test_bearings_on_a_turning_robot_are_those_of_each_beams_own_time(
         ("lms221(resolution_deg=0.25)", [16, 32, 48, 64]),
     ],
 )
-def test_a_scan_ends_with_the_step_of_its_last_beam(
-    room: SimpleNamespace, name: str, steps: list[int]
-) -> None:
+def test_a_scan_ends_with_the_step_of_its_last_beam(room, name, steps):
     world, data = room.build()
     lidar = LaserScanner(world, f"{name}:ideal")
     advance = room.stepper(world, data)
@@ -176,16 +172,7 @@ def test_errors_can_be_named_with_any_scanner() -> None:
         ("utm30lx(fov_deg=90)", "no setting 'fov_deg'; it has none"),
         ("scanner(fov_deg=90)", "needs beams=..., rate_hz=..., sigma_m=..."),
         ("scanner(fov_deg=400, beams=10, rate_hz=10, sigma_m=0)", "fov_deg must be > 0 and at"),
-        (
-            "scanner(fov_deg=90, beams=10, rate_hz=1000, sigma_m=0)",
-            "rate_hz must be a number from",
-        ),
         ("scanner(fov_deg=90, beams=1e9, rate_hz=10, sigma_m=0)", "beams must be a whole number"),
-        (
-            "scanner(fov_deg=90, beams=99999999, rate_hz=10, sigma_m=0)",
-            "beams must be .* 2 to 10000",
-        ),
-        ("scanner(fov_deg=nan, beams=10, rate_hz=10, sigma_m=0)", "fov_deg must be"),
         ("x" * 300, "no scanner is called"),
     ],
 )
@@ -194,22 +181,10 @@ def test_what_is_no_scanner_is_refused_with_what_there_is(text: str, message: st
         scanner_of(text)
 
 
-def test_a_scanner_that_cannot_be_is_refused() -> None:
-    with pytest.raises(InvalidValueError, match="beams must be measured within"):
-        Scanner(name="slow", first_deg=0.0, step_deg=1.0, n_beams=3, rate_hz=10.0,
-                range_max_m=10.0, beam_times_s=(0.0, 0.05, 0.2))  # fmt: skip
-    with pytest.raises(InvalidValueError, match=r"Band\.error_m"):
-        Band(up_to_m=1.0, error_m=-0.1)
-    with pytest.raises(InvalidValueError, match=r"SerialLink.config must be a Lms221Config"):
-        stream("arena", seconds=1.0, laser="utm30lx", baud=38400)
-
-
 PAGE = Path(__file__).parents[4] / "docs" / "scanners.md"
 
 
-def test_a_model_from_a_folder_outside_simulates(
-    tmp_path: Path, monkeypatch: pytest.MonkeyPatch
-) -> None:
+def test_a_model_from_a_folder_outside_simulates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """The file that the page shows, and the same with beams that are all measured at once."""
     code = PAGE.read_text().split("```python\n")[1].split("```")[0]
     flash = "range_max_m=20.0, beam_times_s=(0.5 / rate_hz,) * 181,"

@@ -52,14 +52,3 @@ def test_branch_and_bound_equals_exhaustive_search_in_200_of_200_cases() -> None
         found, (score, place) = best_of(lattice), exhaustive(lattice)
         assert found.score == pytest.approx(score, abs=1e-9)
         assert [found.heading, found.row, found.column] == place
-
-
-@pytest.mark.parametrize("share", [0.02, 1.0])  # of values above 0; the first: most blocks empty
-def test_ahead_are_the_largest_of_what_lies_ahead(share: float) -> None:
-    rng = np.random.default_rng(1)
-    field = np.where(rng.random((21, 40)) < share, rng.integers(0, 255, (21, 40)), 0)
-    field = field.astype(np.uint8)
-    ahead = look_ahead(field, np.zeros_like(field))
-    for r in range(21):
-        for c in range(40):
-            assert ahead[r, c] == field[r : r + 8, c : c + 8].max()

@@ -12,7 +12,7 @@ from slam._jit import njit
 from slam.frames import Features, Odometry, Scan
 from slam.frontend import surfaces
 from slam.frontend.observations import Observations, from_features, from_scan
-from slam.frontend.odometry_prior import inverted, predict, turned
+from slam.frontend.odometry_prior import predict
 from slam.shunting.slam import ShuntingConfig
 from slam.tracker.matching.local_search import SearchWindow
 from slam.tracker.matching.matcher import Matcher, seen_by
@@ -93,15 +93,6 @@ def test_gradient_and_curvature_agree_with_differences(objective: str) -> None:
     best = np.zeros(3)
     second = (score(best + step)[0] - 2.0 * score(best)[0] + score(best - step)[0]) / 4e-6
     assert -second == pytest.approx(score(best)[2][0, 0], rel=0.15)
-
-
-def test_climbing_finds_a_known_pose() -> None:
-    network, matcher = room(), Matcher(CONFIG)
-    truth = np.array([0.04, -0.03, 0.01])
-    seen = from_scan(room_scan(truth), np.zeros(3), CONFIG)
-    match = matcher.climb(network, seen, np.zeros(3), np.zeros(3), np.eye(3) * 10.0)
-    assert match.matched > 0.9
-    np.testing.assert_allclose(match.T_map_robot, truth, atol=0.004)
 
 
 def test_search_finds_a_far_pose() -> None:
@@ -212,16 +203,6 @@ def test_prior_comes_from_the_frames_own_covariance() -> None:
     silent = Odometry(stamp_ns=200_000_000, T_odom_robot=now.T_odom_robot)
     assumed = predict(T_map, before, silent).covariance
     assert 0.01 < math.sqrt(assumed[0, 0]) < 0.1
-
-
-def test_small_matrices_agree_with_numpy() -> None:
-    rng = np.random.default_rng(4)
-    root = rng.normal(size=(3, 3))
-    m = root @ root.T + np.eye(3)
-    np.testing.assert_allclose(inverted(m), np.linalg.inv(m), atol=1e-12)
-    c, s = math.cos(0.7), math.sin(0.7)
-    R = np.array([[c, -s, 0.0], [s, c, 0.0], [0.0, 0.0, 1.0]])
-    np.testing.assert_allclose(turned(m, 0.7), R @ m @ R.T, atol=1e-12)
 
 
 def test_the_other_face_of_a_thin_wall_does_not_count() -> None:

@@ -111,17 +111,6 @@ def test_all_vote_without_earlier_scans_and_when_it_is_off() -> None:
     assert seen_by(off.weighted(NS_PER_S // 5, HERE, SURE, now)).weights.min() == 1.0
 
 
-def test_with_all_votes_a_match_is_bit_for_bit_one_without() -> None:
-    network, matcher, scan = room(), Matcher(CONFIG), seen()
-    same = np.ones(len(scan.points_robot))
-    start, firm = np.array([0.01, 0.01, 0.0]), np.diag([1e4, 1e4, 1e6])
-    one = matcher.climb(network, scan, start, HERE, firm)
-    other = matcher.climb(network, _weighing(scan, same), start, HERE, firm)
-    assert one.T_map_robot.tobytes() == other.T_map_robot.tobytes()
-    assert one.matched == other.matched == other.overlapped
-    assert seen_by(scan).weights.min() == 1.0
-
-
 def test_without_a_vote_what_is_young_says_nothing_and_is_not_missed() -> None:
     config = ShuntingConfig(cell_m=0.05, trace_s=0.0)  # the map is all young
     network, scan = room(), seen()
