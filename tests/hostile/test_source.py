@@ -34,14 +34,12 @@ IMPORTERS = {
     "sim/view/camera.py": "the GL libraries, by constants",
     "scripts/workers.py": "Dask",
     "scripts/benches/against.py": "ir-sim, by a constant",
-    "scripts/cli.py": "verbs of ours, by constants",
     "scripts/exports.py": "pyarrow, by constants",
     "scripts/spec.py": "names to complete, by constants",
     "slam/ros/link.py": "the two middlewares, by constants",
     "slam/settings.py": "homes of constants, by constants",
     "scripts/live/served.py": "viser, and what its messages are read with, by constants",
     "scripts/live/replay.py": "the same",
-    "scripts/live/page.py": "the same",
     "scripts/verbs/reproduce.py": "experiments of ours",
 }
 PRIVATE = {  # both ends are ours, over a socket that nobody else has
