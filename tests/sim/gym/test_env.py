@@ -10,6 +10,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import sim  # noqa: F401  (registers the environments)
 from sim.gym.env import MobiliaEnv
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.view import gl
 from slam.errors import InvalidValueError, MobiliaError
 
@@ -111,8 +112,7 @@ def running() -> MobiliaEnv:
         ({"options": {"seeds": 5}}, "reset options.seeds must be a table"),
         ({"options": {"n_people": -1}}, "n_people"),
         ({"options": {"rates": {"door_rat": 1.0}}}, "door_rat"),
-        ({"options": {"moving_share": 3.0}}, "moving_share"),
-        ({"options": {"resolution_deg": 0.3}}, "resolution_deg"),
+        ({"options": {"rates": {"moving_share": 3.0}}}, "moving_share"),
         ({"options": {"laser": "best"}}, "no scanner is called .best.. Known: lms221"),
         ({"options": {"start": (0.0, 0.0)}}, "option start must be"),
         ({"options": {"start": (99.0, 0.0, 0.0)}}, "free floor"),
@@ -141,10 +141,8 @@ def test_an_episode_can_have_its_own_counts_rates_laser_and_start():
         options={
             "n_chairs": 2,
             "crowd": "none",  # nobody stands where it starts
-            "rates": {"chair_push_rate": 0.3},
-            "moving_share": 1.0,
-            "resolution_deg": 1.0,
-            "noise_std_m": 0.0,
+            "rates": {"chair_push_rate": 0.3, "moving_share": 1.0},
+            "laser": Lms221Config(resolution_deg=1.0, noise_std_m=0.0),
             "start": start,
         },
     )
