@@ -101,7 +101,6 @@ class Drive:
                 "The same rooms on a tour that its errors do not steer:": command(
                     "compare", *elsewhere
                 ),
-                "Both in one report:": command("report", "out/compare", "--drive", out),
             },
             settings=asdict(plan),
         ))  # fmt: skip
