@@ -85,8 +85,6 @@ WRONG = [
     ("export none.mcap --to minari", "mobilia generate SCENE --format minari"),
     ("export none.mcap --to hdf5", "--to must be one of mcap, db3, parquet, npz, carmen, tum,"),
     ("generate arena --format hdf5", "--format must be one of mcap, db3, parquet, npz, carmen,"),
-    ("export none.mcap --to tum --slam ekf", "--slam is for --to smfeval, got --to tum"),
-    ("export none.mcap --to smfeval --slam shuntin", "no SLAM is called 'shuntin'"),
     ("export none.mcap --to carmen --out .", "--out must be a file, got the folder"),
     ("render absent", "absent: no such file"),
     ("report no", "no such folder: mobilia compare"),
