@@ -16,28 +16,21 @@ from rosbags.interfaces import Connection, ConnectionExtRosbag2
 from rosbags.rosbag2 import CompressionFormat, CompressionMode, Reader, StoragePlugin, Writer
 from rosbags.typesys import Stores, get_types_from_msg, get_typestore
 
-from scripts.machine import versions
-from scripts.names import file_name
 from sim.recording.bag import VERSION
 from sim.recording.recipe import RECIPE, read_recipe
-from slam import create, se2
 from slam.errors import InvalidValueError, LogFormatError
-from slam.evaluation.wide_tum import write_wide_tum
 from slam.files import PART, replacing
 from slam.frames import EPOCH, BeamClass, LaserSpec, Stream
 from slam.logs import open_log, read_bag, write_carmen
 from slam.logs.bag_topics import ROS2, Bag, failing_as_ours, is_bag
-from slam.oracle import shown
-from slam.replay import Track
 from slam.trajectory import Trajectory, write_tum
 
 
 @dataclass(frozen=True)
 class Source:
-    """A recording: its path, and for ``smfeval`` the SLAM that is run on it."""
+    """A recording."""
 
     log: Path
-    slam: str = "shunting"
 
     @cached_property
     def stream(self) -> Stream:
@@ -71,31 +64,6 @@ def tum(target: Path, source: Source) -> list[Path]:
         written.append(target.with_name(f"{target.stem}_truth{target.suffix}"))
         poses = np.array([truth[k] for k in known])
         write_tum(written[-1], Trajectory(stamps_ns=at[known], poses=poses), epoch_ns)
-    return written
-
-
-def smfeval(target: Path, source: Source) -> list[Path]:
-    """What a SLAM believes online with its covariances, and the truth in its map."""
-    slam = source.slam
-    track = Track(slam, create(slam))
-    truth: list[tuple[int, NDArray[np.float64]]] = []
-    for frame in source.stream:
-        track.take(shown(track.system, frame))
-        if frame.truth is not None:
-            truth.append((frame.stamp_ns, frame.truth))
-    if not track.estimates:
-        raise InvalidValueError("smfeval scores poses: this log has no frames")
-    online, epoch_ns = track.online(), source.epoch_ns
-    written = [target.with_name(f"{target.stem}_{file_name(slam)}{target.suffix}")]
-    write_wide_tum(
-        written[0], online, track.covariances(), epoch_ns=epoch_ns, algorithm=slam,
-        version=versions()["mobilia"],
-    )  # fmt: skip
-    if truth and truth[0][0] == online.stamps_ns[0]:  # the map begins where the robot does
-        written.append(target.with_name(f"{target.stem}_truth{target.suffix}"))
-        stamps = np.array([stamp_ns for stamp_ns, _ in truth])
-        poses = np.array([se2.between(truth[0][1], pose) for _, pose in truth])
-        write_tum(written[1], Trajectory(stamps_ns=stamps, poses=poses), epoch_ns)
     return written
 
 

@@ -24,7 +24,7 @@ class Format:
 FORMATS = {
     BAG: Format(".mcap"), "db3": Format(".db3"), "parquet": Format(".parquet", ("pyarrow",)),
     "npz": Format(".npz"), "carmen": Format(".log.gz"), "tum": Format(".tum"),
-    "smfeval": Format(".tum"), MINARI: Format("", ("pyarrow", "minari")),
+    MINARI: Format("", ("pyarrow", "minari")),
 }  # fmt: skip
 
 

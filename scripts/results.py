@@ -7,7 +7,6 @@ from contextlib import suppress
 from pathlib import Path
 
 from scripts.benchmark import submission
-from scripts.closed_loop import tables as closed_loop
 from scripts.comparison import folder as compared
 from scripts.comparison import schema
 from scripts.comparison.run_file import RunFile
@@ -92,10 +91,6 @@ def _unreadable(folder: Path) -> list[Fault]:
         schemas = {*settings} if isinstance(settings, dict) else set()
         if command == "compare" or "compare_schema" in schemas:
             compared.read(folder, vouched=True).check()
-            for drive in closed_loop.drives_in(folder):
-                closed_loop.driven(drive)
-        elif command == "drive" or "drive_schema" in schemas:
-            closed_loop.driven(folder, vouched=True)
     except LogFormatError as error:
         return [Fault(kind="damaged", name=error.path.name, why=str(error))]
     return []

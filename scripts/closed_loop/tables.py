@@ -1,22 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""From runs to ``goals.csv``, ``runs.csv`` and ``levels.csv``, and how a report reads them back."""
+"""From runs to ``goals.csv``, ``runs.csv`` and ``levels.csv``."""
 
 import math
 from collections.abc import Sequence
-from dataclasses import dataclass
-from pathlib import Path
-from typing import Annotated, Any, Literal
 
 import numpy as np
-from msgspec import Meta, Struct
 
-from scripts.closed_loop.plan import IDENTITY, SCHEMA
+from scripts.closed_loop.plan import IDENTITY
 from scripts.closed_loop.runs import DrivenRun
-from scripts.comparison.folder import axis_in, check_recipe
-from scripts.comparison.rules import Columns, Table, check_keys, number, word
-from scripts.comparison.tables import Row, grouped, read_csv
-from scripts.output import RECIPE, check_whole
-from slam.errors import LogFormatError
+from scripts.comparison.rules import Columns, Table, number, word
+from scripts.comparison.tables import Row, grouped
 from slam.evaluation.statistics import median_interval, quantile, share_interval
 
 OUTCOMES = ("reached", "wrong", "given up", "failed")
@@ -120,64 +113,3 @@ TABLE = Table(
     ),
 )  # fmt: skip
 """``levels.csv``."""
-_RECIPE: Columns = {"command": Literal["drive"], "settings": dict[str, Any]}
-
-
-class _Loop(Struct):
-    tolerance_m: Annotated[float, Meta(ge=0.0, le=1e9)]
-    plan_on: Literal["layout", "map"]
-
-
-@dataclass(frozen=True, kw_only=True)
-class Driven:
-    """The folder of a drive: its recipe's settings and the rows of its ``levels.csv``."""
-
-    settings: dict[str, Any]
-    rows: list[Row]
-
-    @property
-    def scene(self) -> str:
-        """A drive has one."""
-        return str(self.rows[0]["scene"])
-
-    @property
-    def slams(self) -> list[str]:
-        """In the order in which they were named."""
-        return list(dict.fromkeys(str(row["slam"]) for row in self.rows))
-
-    @property
-    def axis(self) -> str:
-        """What the levels are of."""
-        return str(self.settings.get("axis", "dynamism"))
-
-    @property
-    def levels(self) -> list[float]:
-        """Of that axis, ascending."""
-        return sorted({float(row["dynamism"]) for row in self.rows})
-
-    def of(self, slam: str) -> list[Row]:
-        """A SLAM's rows."""
-        return [row for row in self.rows if row["slam"] == slam]
-
-
-def driven(folder: Path, *, vouched: bool = False) -> Driven:
-    """A drive on file; ``LogFormatError`` for a folder that holds none.
-
-    vouched  the hashes of its files have been checked
-    """
-    check_whole(folder)
-    path = folder / RECIPE
-    settings = check_recipe(path, _RECIPE)["settings"]
-    if settings.get("drive_schema") != SCHEMA:
-        got = f"settings.drive_schema is {settings.get('drive_schema')!r:.80}"
-        raise LogFormatError(folder, f"no closed-loop drive of schema {SCHEMA}: {got}")
-    check_keys(path, "settings.", settings, {"loop": _Loop})
-    rows = read_csv(folder / LEVELS, TABLE, axis_in(settings, path), vouched=vouched)
-    if not rows:
-        raise LogFormatError(folder / LEVELS, "a table without rows")
-    return Driven(settings=settings, rows=rows)
-
-
-def drives_in(folder: Path) -> list[Path]:
-    """The folders of drives within that of a comparison, which a report shows unasked."""
-    return sorted(path for path in folder.glob("drive*") if path.is_dir())

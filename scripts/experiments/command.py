@@ -17,14 +17,8 @@ from scripts.result_files import RESULTS, SCHEMA, commit
 from sim.core.versions import WORLD
 
 
-def add_options(parser: argparse.ArgumentParser, out: str, page: Path) -> None:
-    """``--seeds``, ``--first-seed``, ``--seconds``, ``--jobs``, ``--results``, ``--page``."""
-    parser.add_argument("--seeds", type=int, default=10, help="how many")
-    add_run_options(parser, out, page)
-
-
 def add_run_options(parser: argparse.ArgumentParser, out: str, page: Path) -> None:
-    """The same without ``--seeds``, where these follow from something else."""
+    """``--first-seed``, ``--seconds``, ``--jobs``, ``--results``, ``--page``."""
     parser.add_argument("--first-seed", type=int, default=500, help="nobody tuned on these")
     parser.add_argument("--seconds", type=float, default=60.0, help="of each run, simulated")
     parser.add_argument("--jobs", type=int, default=1, help="processes")

@@ -9,16 +9,12 @@ from matplotlib.figure import Figure
 from matplotlib.ticker import MaxNLocator
 
 from scripts import figures
-from scripts.closed_loop.tables import Driven
 from scripts.comparison.tables import Row, number
 from scripts.figures import COLORS, SVG, color_of, log_axis, remark, styled, svg
 from scripts.metrics.table import Metric
 from scripts.report.study import LEAST_RUNS, Study
 
 SIZE = (4.0, 2.8)  # inches, of 96 pixels
-SUCCESS = ("success", "success_low", "success_high")
-PRECISION = ("precision_m", "precision_m_low", "precision_m_high")
-_OF = {SUCCESS: ("goals",), PRECISION: ("reached", "wrong")}  # whose sum each is of
 Lines = Mapping[str, Sequence[figures.Point]]
 """By SLAM, its points at the levels."""
 
@@ -34,34 +30,6 @@ def curve(study: Study, scene: str, metric: Metric) -> str:
     _draw(ax, lines, study.levels, study.axis, study.slams)
     _y_axis(ax, metric)
     return svg(figure, f"{metric.name} against {study.axis} in {scene}")
-
-
-def of_drive(drive: Driven, slams: Sequence[str]) -> list[tuple[str, str]]:
-    """(name, SVG) of goals reached and of precision against the level; ``slams`` give colours."""
-    return [
-        ("goals reached", _of_drive(drive, slams, SUCCESS, "goals truly reached, %")),
-        ("precision", _of_drive(drive, slams, PRECISION, "distance from the goal, cm")),
-    ]
-
-
-@styled(SVG)
-def _of_drive(drive: Driven, slams: Sequence[str], keys: tuple[str, str, str], label: str) -> str:
-    lines = {
-        slam: [_point(row, keys, 100.0, few=few_goals(row, keys)) for row in drive.of(slam)]
-        for slam in drive.slams
-    }
-    figure = Figure(figsize=SIZE, layout="constrained")
-    ax = figure.subplots()
-    _draw(ax, lines, drive.levels, drive.axis, slams)
-    ax.set_ylabel(label)
-    ax.set_ylim(0.0, 103.0 if keys == SUCCESS else None)
-    ax.yaxis.set_major_locator(MaxNLocator(5))
-    return svg(figure, f"{label} against {drive.axis} in {drive.scene}")
-
-
-def few_goals(row: Row, keys: tuple[str, str, str]) -> bool:
-    """Whether it is of too few goals for an interval."""
-    return sum(float(row[column]) for column in _OF[keys]) < LEAST_RUNS
 
 
 def _draw(ax: Axes, lines: Lines, levels: Sequence[float], axis: str, slams: Sequence[str]) -> None:

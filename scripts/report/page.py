@@ -2,11 +2,9 @@
 """The page: what each part of the template is given, and the one file that comes out."""
 
 import math
-from collections.abc import Sequence
 from pathlib import Path
 from typing import Any
 
-from scripts.closed_loop.tables import Driven
 from scripts.comparison.plan import Run
 from scripts.comparison.rules import LEVEL
 from scripts.comparison.schema import LATER, NOT_ASKED, settings
@@ -25,24 +23,23 @@ REPORT = "report.html"
 ANSWERED = ("finished", "lost")  # how a run ends in which nothing failed
 
 
-def write(study: Study, drives: Sequence[Driven] = ()) -> Path:
+def write(study: Study) -> Path:
     """Write ``report.html`` into the comparison's folder; its path."""
     path = study.compared.folder / REPORT
-    write_text(path, render(study, drives))
+    write_text(path, render(study))
     add_to_sums(path)
     return path
 
 
-def render(study: Study, drives: Sequence[Driven] = ()) -> str:
+def render(study: Study) -> str:
     """The page as text: everything is in it, it asks for nothing."""
-    slams = list(dict.fromkeys([*study.slams, *(s for drive in drives for s in drive.slams)]))
+    slams = study.slams
     scenes = [_scene(study, scene) for scene in study.scenes]  # first: these read the runs
     many = len(study.levels) > 1  # of one there is no curve and no growth
     pairs = study.measures(PAIRED)
     return template("page.html", Path(__file__).parent).render(
         study=study,
         marks={slam: (glyph(slam, slams), color_of(slam, slams)) for slam in slams},
-        drives=[(drive, curves.of_drive(drive, slams), tables.of_drive(drive)) for drive in drives],
         settings=study.compared.settings,
         answers=answers(study),
         controls=_controls(study),

@@ -6,13 +6,11 @@ from collections import Counter
 from collections.abc import Callable, Mapping, Sequence
 from functools import partial
 
-from scripts.closed_loop.tables import Driven
 from scripts.comparison.schema import OUTCOMES
 from scripts.comparison.tables import Row, by_seed, number
 from scripts.metrics.table import METRICS, Metric, digits
 from scripts.pages.table import NONE, Cell, Table, grid
 from scripts.report.answer import percent
-from scripts.report.curves import PRECISION, SUCCESS, few_goals
 from scripts.report.study import LEAST_RUNS, Study, verdict
 from slam.evaluation.statistics import quantile, ratio_interval
 from slam.variants import ORACLE
@@ -213,40 +211,3 @@ def costs(study: Study, metrics: Sequence[Metric]) -> Table:
 
     caption = "middle of the medians of all scenes and levels, and their range"
     return grid(caption, "SLAM", study.slams, metrics, cell)
-
-
-def of_drive(drive: Driven) -> Table:
-    """Of ``mobilia drive``: a row for each SLAM and level."""
-    head = ["SLAM", drive.axis, "reached", "wrong", "given up", "failed", "precision, cm",
-            "time, s", "collisions per km", "near misses per km", "runs lost"]  # fmt: skip
-    rows = [_driven(row) for slam in drive.slams for row in drive.of(slam)]
-    return Table(caption=drive.scene, head=head, rows=rows)
-
-
-def _driven(row: Row) -> list[Cell]:
-    success = between = ""
-    if not few_goals(row, SUCCESS):
-        success = f"{100.0 * row['success_low']:.0f} to {100.0 * row['success_high']:.0f} %"
-    low, high = (row[key] for key in PRECISION[1:])
-    if not few_goals(row, PRECISION) and low is not None and high is not None:
-        between = f"{digits(100 * low)} to {digits(100 * high)}"
-    lost = [
-        percent(int(row["runs_lost"]), int(row["runs"])),
-        f"{row['runs_recovered']:g} recovered",
-    ]
-    return [
-        Cell(text=str(row["slam"])),
-        Cell(text=f"{row['dynamism']:g}"),
-        Cell(text=f"{row['reached']:g} of {row['goals']:g}", small=success),
-        *(Cell(text=f"{row[key]:g}") for key in ("wrong", "given_up", "failed")),
-        Cell(text=_number(row["precision_m"], 100.0), small=between),
-        *(
-            Cell(text=_number(row[key]))
-            for key in ("time_s", "collisions_per_km", "near_misses_per_km")
-        ),
-        Cell(text=f"{row['runs_lost']:g} of {row['runs']:g}", small="\n".join(filter(None, lost))),
-    ]
-
-
-def _number(value: float | None, factor: float = 1.0) -> str:
-    return NONE if value is None else digits(value * factor)

@@ -108,7 +108,6 @@ class Drive:
             title=f"{plan.scene}: steered by its SLAM", said=said(plan, rows), parts=parts,
             next={
                 "The same rooms on a tour that its errors do not steer:": tour,
-                "Both in one report:": command_line("report", folder=compared, drive=out),
             },
             settings=asdict(plan),
         ))  # fmt: skip

@@ -7,11 +7,8 @@ from rich.markup import escape
 
 from scripts.console import say, working
 from scripts.formats import FORMATS, ready
-from scripts.names import check, run_name
-from scripts.spec import REQUIRED, SLAMS, argument, names_of, option, spec
-from slam.errors import InvalidValueError
-
-SLAM = "shunting"
+from scripts.names import run_name
+from scripts.spec import REQUIRED, argument, names_of, option, spec
 
 
 @spec
@@ -21,8 +18,7 @@ class Export:
     mcap, db3: the very messages of a bag of ROS 2, packed as MCAP or as SQLite. parquet (extra
     `data`): a row a scan, ranges and labels as lists of fixed size. npz: the same as arrays by
     name. carmen: scans, odometry, true poses. tum: NAME_odometry.tum and, where it is known,
-    NAME_truth.tum. smfeval: runs a SLAM; NAME_SLAM.tum has its online poses with their covariances
-    ("wide TUM"), NAME_truth.tum the true ones in its map. minari is of `generate --format`.
+    NAME_truth.tum. minari is of `generate --format`.
     """
 
     episode: Path = argument("An episode, a bag or any other log.", REQUIRED)
@@ -34,12 +30,8 @@ class Export:
         "File to write; default beside the log or dataset. tum: NAME_odometry.tum, ...",
         writes="file",
     )
-    slam: str = option("With --to smfeval: whose poses.", SLAM, complete=SLAMS)
 
     def __call__(self) -> None:
-        if self.slam != SLAM and self.to != "smfeval":
-            raise InvalidValueError(f"--slam is for --to smfeval, got --to {self.to}")
-        check([self.slam])
         suffix = ready(self.to).suffix
         from scripts.exports import Source, write
         from sim.recording.verify import check_bag
@@ -49,7 +41,7 @@ class Export:
         name = plain.name if plain.is_dir() else run_name(plain)
         target = self.out or _beside(plain) / (name + suffix)
         with working(f"writing {self.to}"):
-            written = write(self.to, target, Source(self.episode, self.slam))
+            written = write(self.to, target, Source(self.episode))
         for path in written:
             say(escape(str(path)))
 

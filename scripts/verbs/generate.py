@@ -51,8 +51,8 @@ class Generate:
         metavar="NAME:N,...",
     )
     format: str = option(
-        "Also write each episode so, beside its bag: db3, parquet, npz, carmen, tum or smfeval (as "
-        "export does). minari: no bags, but episodes with actions and rewards, driven to goals.",
+        "Also write each episode so, beside its bag: db3, parquet, npz, carmen or tum (as export "
+        "does). minari: no bags, but episodes with actions and rewards, driven to goals.",
         BAG,
         choices=tuple(FORMATS),
         metavar="FORMAT",

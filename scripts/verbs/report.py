@@ -8,7 +8,6 @@ from rich.markup import escape
 
 from scripts.console import fact, say, working
 from scripts.spec import REQUIRED, SLAMS, argument, option, spec
-from slam.errors import MissingPathError
 
 if TYPE_CHECKING:
     from scripts.report.study import Study
@@ -24,30 +23,22 @@ class Report:
     """
 
     folder: Path = argument("Folder that mobilia compare wrote.", REQUIRED, metavar="DIR")
-    drive: list[Path] | None = option(
-        "Folders that mobilia drive wrote; DIR/drive* need not be named."
-    )
     subject: str | None = option(
         "SLAM that the page is about; default the one named first.", complete=SLAMS
     )
     replays: bool = option("Also DIR/replays: the subject's worst run of each scene.", False)
 
     def __call__(self) -> None:
-        from scripts.closed_loop.tables import driven, drives_in
         from scripts.output import locked_folder
         from scripts.report import page
         from scripts.report.answer import failed
         from scripts.report.study import check_comparison, study
 
         check_comparison(self.folder)
-        for one in self.drive or ():
-            if not one.exists():
-                raise MissingPathError(one, "no such folder")
-        found = [*(self.drive or []), *drives_in(self.folder)]
         about = study(self.folder, self.subject)
         with locked_folder(self.folder, "compare"):
             with working("drawing the page"):
-                path = page.write(about, [driven(one) for one in found])
+                path = page.write(about)
             for line in failed(about.compared.runs, about.axis):
                 fact(line, bad=True)
             for line in page.answers(about):

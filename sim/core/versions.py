@@ -12,7 +12,7 @@ To change the world: raise ``WORLD``, say in ``CHANGES`` what became of the old 
 
 from collections.abc import Mapping
 from pathlib import Path
-from typing import Any, NoReturn
+from typing import Any
 
 from slam.errors import LogFormatError, MobiliaError
 
@@ -59,9 +59,3 @@ def check_world(path: Path | str, version: int) -> None:
     why = not_this_world(version)
     if why:
         raise WorldVersionError(f"{path}: cannot be made again, {why}")
-
-
-def gone(name: str, version: int, **_: Any) -> NoReturn:
-    """What the environment id of an old version makes: a ``WorldVersionError``."""
-    changes = ". ".join(CHANGES[k] for k in range(version, WORLD))
-    raise WorldVersionError(f"{name}-v{version} is gone, use {name}-v{WORLD}. {changes}.")

@@ -35,13 +35,11 @@ def row_of(space: spaces.Dict) -> np.dtype[Any]:
 
     command  (2,) in [-1, 1]: of the next step          reward
     ends     (2,) whether the episode was terminated, truncated
-    now      ``seen`` and ``told``: observations and infos by name
-    last     the same of the end of an episode, where the room has begun anew since
+    seen, told  observations and infos by name
     """
     seen = np.dtype([(name, one.dtype, one.shape or ()) for name, one in space.items()], align=True)
-    shown = np.dtype([("seen", seen), ("told", TOLD)], align=True)
-    told = [("command", "f8", (2,)), ("reward", "f8"), ("ends", "?", (2,))]
-    return np.dtype([*told, ("now", shown), ("last", shown)], align=True)
+    own = [("command", "f8", (2,)), ("reward", "f8"), ("ends", "?", (2,))]
+    return np.dtype([*own, ("seen", seen), ("told", TOLD)], align=True)
 
 
 def board_of(row: np.dtype[Any], n: int, memory: mmap.mmap | None = None) -> Board:
@@ -86,16 +84,12 @@ class Block:
         observation, row["reward"], *ends = self._rooms[i].act(*row["command"].tolist())
         row["ends"] = ends
         self._keep(i, observation)
-        if self._mode == AutoresetMode.SAME_STEP and any(ends):
-            row["last"] = row["now"]
-            self._restart(i, None, None)
-            row["ends"] = ends
 
     def _restart(self, i: int, seed: int | None, options: dict[str, Any] | None) -> None:
         room = self._rooms[i]
         observation, _ = room.reset(seed=seed, options=options)
         for name, value in observation.items():
-            shape = self.board["now"]["seen"][name].shape[1:]
+            shape = self.board["seen"][name].shape[1:]
             if value.shape != shape:
                 raise InvalidValueError(
                     f"observation '{name}' has shape {value.shape}, the others {shape}: set the "
@@ -108,11 +102,11 @@ class Block:
             room.prepare(self._threads)
 
     def _keep(self, i: int, observation: Observation) -> None:
-        now = self.board["now"][i]
+        row = self.board[i]
         for name, value in observation.items():
-            now["seen"][name] = value
+            row["seen"][name] = value
         for name, value in self._rooms[i].told().items():
-            now["told"][name] = math.nan if value is None else value
+            row["told"][name] = math.nan if value is None else value
 
     def each(self, work: Callable[[MobiliaEnv], Any], rooms: Sequence[int]) -> dict[int, Any]:
         """What ``work`` of each of these rooms returns, by their number."""

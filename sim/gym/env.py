@@ -128,14 +128,11 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     |                           | and change of the constructor too                             |
     | `motion`, `change`        | 0 to 1, one of the two axes alone                             |
     | `crowd`                   | who is there besides: "none", "escorts:6,boards:2"            |
-    | `moving_share`            | share of chairs on the move at any time                       |
     | `rates`                   | single rates of ``Dynamism``, e.g. ``{"door_rate": 0.1}``     |
     | `scan_height_m`           | of the scanner above the floor                                |
-    | `resolution_deg`          | of a ``Lms221Config``: 1, 0.5 or 0.25; changes the observation |
-    |                           | space (give ``laser`` to the constructor where a wrapper holds |
-    |                           | on to the space)                                              |
-    | `noise_std_m`             | of a ``Lms221Config``: statistical error of the ranges         |
-    | `laser`                   | a scanner by name, a ``Scanner`` or a ``Lms221Config``        |
+    | `laser`                   | a scanner by name, a ``Scanner`` or a ``Lms221Config``; where |
+    |                           | a wrapper holds on to the observation space, give one of as   |
+    |                           | many beams                                                    |
     | `seeds`                   | stream name -> seed (``sim.core.seeds``) |
 
     ### Version history
@@ -143,7 +140,7 @@ class MobiliaEnv(gymnasium.Env[Observation, NDArray[np.float32]]):
     v2: two axes, motion and change, and crowds; dynamism d of v1 is ``Dynamism.world_1(d)`` with
     ``crowd="none"``.
     v1: the table of ``sim.core.dynamism`` was set again; the same seed gives another world than in
-    v0. v0: first version; making it raises ``WorldVersionError``.
+    v0. v0: first version.
     """
 
     metadata: dict[str, Any] = {  # noqa: RUF012  (Gymnasium's own class attribute)

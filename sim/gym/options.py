@@ -14,15 +14,14 @@ from scenes.registry import check_name
 from scenes.scene import HIGHEST, LOWEST
 from sim.core.dynamism import Dynamism
 from sim.gym.goals import Goal, goal_of
-from sim.sensors.lidar.models.lms221 import Lms221Config
-from sim.sensors.lidar.registry import ScannerConfig, scanner_of
+from sim.sensors.lidar.registry import scanner_of
 from sim.sensors.odometry.config import preset
 from slam.errors import InvalidValueError
 from slam.shaped import Pose, instance, shaped, within
 
 OPTIONS = (
     "goal", "start", "seeds", "scene", "n_chairs", "n_people", "dynamism", "motion", "change",
-    "crowd", "moving_share", "rates", "scan_height_m", "resolution_deg", "noise_std_m", "laser",
+    "crowd", "rates", "scan_height_m", "laser",
 )  # fmt: skip
 _BY_NAME = dict.fromkeys(("seeds", "scene", "rates"), dict[str, Any] | None)
 _Options = defstruct(  # the values of the others are checked where they are used
@@ -85,7 +84,7 @@ def episode(
         merged.pop("crowd", None)
     else:
         merged["crowd"] = str(crowd_of(merged["crowd"]))
-    merged["laser"] = _laser(merged["laser"], given)
+    merged["laser"] = scanner_of(given.get("laser", merged["laser"]))
     if "start" in given:
         merged["start"] = shaped("option start", given["start"], Pose)
     return Episode(
@@ -116,7 +115,7 @@ def _rates(settings: Mapping[str, Any], given: Mapping[str, Any]) -> Dynamism:
     said = settings if "dynamism" not in given else {}
     axes = {name: given.get(name, said.get(name)) for name in ("motion", "change")}
     dynamism = given.get("dynamism", settings["dynamism"])
-    rates = Dynamism.of(dynamism, given.get("moving_share"), **axes)
+    rates = Dynamism.of(dynamism, **axes)
     changes = given.get("rates", {})
     known = {f.name for f in fields(Dynamism)}
     for name in sorted(set(changes) - known):
@@ -124,19 +123,6 @@ def _rates(settings: Mapping[str, Any], given: Mapping[str, Any]) -> Dynamism:
             f"option rates: unknown rate {name!r}; known: {', '.join(sorted(known))}"
         )
     return replace(rates, **changes)
-
-
-def _laser(laser: ScannerConfig, given: Mapping[str, Any]) -> ScannerConfig:
-    chosen = scanner_of(given.get("laser", laser))
-    changes = {k: given[k] for k in ("resolution_deg", "noise_std_m") if k in given}
-    if not changes:
-        return chosen
-    if not isinstance(chosen, Lms221Config):
-        raise InvalidValueError(
-            f"option {next(iter(changes))} is of the LMS-221, not of scanner "
-            f"'{chosen.scanner().name}': give a whole scanner as option laser"
-        )
-    return replace(chosen, **changes)
 
 
 def clipped(action: Any) -> tuple[float, float]:

@@ -28,7 +28,7 @@ from slam.shaped import one_of, whole
 
 MOST_ENVS = 4096  # each holds a physics model of its own
 MOST_WORKERS = 1024
-MODES = tuple(mode.name.lower() for mode in AutoresetMode)
+MODES = ("next_step", "disabled")
 
 
 class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
@@ -42,16 +42,14 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
     ### Autoreset
     ``autoreset_mode`` "next_step" (Gymnasium's default): the step after the one that ended an
     episode ignores that room's action and returns its reset observation with reward 0; drop that
-    transition when learning. "same_step": the ending step already returns the observation of the
-    new episode, the last one of the old is in ``infos["final_obs"][i]``. "disabled": stepping a
-    room that has ended is an error, ``reset`` with a ``reset_mask`` comes first. A room that resets
-    by itself goes on with its own generator, and without options.
+    transition when learning. "disabled": stepping a room that has ended is an error, ``reset`` with
+    a ``reset_mask`` comes first. A room that resets by itself goes on with its own generator, and
+    without options.
 
     ### Infos
     ``pose`` (n, 3), ``goal`` (n, 2) and ``goal_distance`` (n,) NaN without a goal,
     ``hard_collision`` (n,), ``is_success`` (n,), all with a mask of the same name and a leading
-    "_", here always true. They are of the new episode where "same_step" began one;
-    ``infos["final_info"]`` has those of the old one. Whatever else a room knows, ``each`` asks for:
+    "_", here always true. Whatever else a room knows, ``each`` asks for:
     ``rooms.each(attrgetter("simulation.frame"))``.
 
     ### Workers
@@ -98,7 +96,6 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
             board = board_of(row_of(space), num_envs)
             self._rooms = Block(dict(enumerate(rooms)), board, self.mode)
         self._board = self._rooms.board
-        self._now, self._last = self._board["now"], self._board["last"]
 
     def each(
         self, work: Callable[[MobiliaEnv], Any], rooms: Sequence[int] | None = None
@@ -136,7 +133,7 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         chosen = {i: seeds[i] for i in np.flatnonzero(mask).tolist()}
         self._rooms.reset(chosen, own)
         self._begun |= mask
-        return _copied(self._now["seen"]), self._infos()
+        return _copied(self._board["seen"]), self._infos()
 
     def _refuse_closed(self) -> None:
         if self.closed:
@@ -174,25 +171,11 @@ class MobiliaVectorEnv(VectorEnv[Observation, NDArray[np.float32], Any]):
         board["command"] = commands
         self._rooms.step()
         terminated, truncated = board["ends"].T.copy()
-        infos = self._infos()
-        if self.mode == AutoresetMode.SAME_STEP and board["ends"].any():
-            infos |= self._final(terminated | truncated)
-        return _copied(self._now["seen"]), board["reward"].copy(), terminated, truncated, infos
-
-    def _final(self, ended: NDArray[np.bool_]) -> dict[str, Any]:
-        """The last observations and infos of the rooms that ended and began anew."""
-        seen, infos = np.full(self.num_envs, None, dtype=object), self._infos()
-        for i in np.flatnonzero(ended).tolist():
-            last = self._last[i]
-            seen[i] = {name: np.array(last["seen"][name]) for name in last["seen"].dtype.names}
-            for name in last["told"].dtype.names:
-                infos[name][i] = last["told"][name]
-        return {
-            "final_obs": seen, "_final_obs": ended, "final_info": infos, "_final_info": ended,
-        }  # fmt: skip
+        rewards, infos = board["reward"].copy(), self._infos()
+        return _copied(board["seen"]), rewards, terminated, truncated, infos
 
     def _infos(self) -> dict[str, Any]:
-        told = _copied(self._now["told"])
+        told = _copied(self._board["told"])
         return told | {f"_{name}": np.ones(self.num_envs, dtype=np.bool_) for name in told}
 
     def render(self) -> None:
@@ -208,6 +191,5 @@ def _copied(rows: NDArray[Any]) -> dict[str, Any]:
 
 
 def _mode(value: str | AutoresetMode) -> AutoresetMode:
-    if isinstance(value, AutoresetMode):
-        return value
-    return AutoresetMode[one_of("autoreset_mode", value, MODES).upper()]
+    name = value.name.lower() if isinstance(value, AutoresetMode) else value
+    return AutoresetMode[one_of("autoreset_mode", name, MODES).upper()]

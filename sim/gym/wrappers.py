@@ -115,7 +115,7 @@ def goal_rooms(
 
     autoreset_mode  who begins the next episode of a room whose last one has ended: "disabled", you,
                     with ``reset(options={"reset_mask": terminated | truncated})`` before the next
-                    step; "next_step" and "same_step", the room itself
+                    step; "next_step", the room itself
     n_workers       processes that step the rooms
     scans           "last": a step takes one scan; "all": each of its scans
     settings        others of ``sim.gym.vector.MobiliaVectorEnv``

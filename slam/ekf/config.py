@@ -6,7 +6,7 @@ from dataclasses import dataclass
 from typing import Any, ClassVar
 
 from slam.landmarks.hypotheses import Gates
-from slam.settings import Settings, number, word
+from slam.settings import Settings, number
 
 SEEDS = "training seeds 0-19 (docs/paper/method.md)"
 SENSOR = "as PointWorldConfig, the world of section 4.2"
@@ -27,7 +27,6 @@ class EkfConfig(Settings):
         "extractor": "slam.frontend.corners",
     }
 
-    association: str = word("ipjc", ("ipjc", "individual"), "IPJC, or each pair alone")
     individual_gate: float = number(
         0.999999, "prob", "of chi-square, a pair alone, 2 dof", SEEDS, low=0.5, high=MOST_GATE
     )
@@ -35,7 +34,7 @@ class EkfConfig(Settings):
         0.999999, "prob", "the same of k pairs together, 2 k dof", SEEDS, low=0.5, high=MOST_GATE
     )
     posterior_gate: float = number(
-        0.99999, "prob", "the same of a pair given those before it; IPJC alone", SEEDS,
+        0.99999, "prob", "the same of a pair given those before it", SEEDS,
         low=0.5, high=MOST_GATE,
     )  # fmt: skip
     noise_scale: float = number(

@@ -26,7 +26,7 @@ from slam.frontend import odometry_prior
 from slam.frontend.corners import answered, corners
 from slam.frontend.odometry_prior import assumed_covariance
 from slam.frontend.polar import hidden, polar
-from slam.landmarks.association import METHODS
+from slam.landmarks.association import ipjc
 from slam.landmarks.filter import MOST_STD_M, EkfFilter
 from slam.landmarks.hypotheses import Association
 from slam.path import OnPath, PosePath
@@ -245,8 +245,7 @@ class EkfSlam(OnPath):
             free = np.flatnonzero(landmarks < 0)
             if len(near) == 0 or len(free) == 0:
                 continue
-            method = METHODS[self.config.association]
-            found = method(self.filter, near, points[free], covariances[free], self._gates)
+            found = ipjc(self.filter, near, points[free], covariances[free], self._gates)
             landmarks[free] = found.landmarks
             plausible[free] |= found.plausible
             cost += found.cost

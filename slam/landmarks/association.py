@@ -1,21 +1,17 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Which observed point is which landmark: one by one, or jointly (IPJC).
+"""Which observed point is which landmark, judged jointly (IPJC).
 
-A *hypothesis* gives each point a landmark or none. Both search for the hypothesis with most pairs,
-and among those for the least cost, and differ in how they judge one:
-
-- ``individual``: each pair alone; the robot's error, which all pairs share, is not seen as such;
-- ``ipjc`` (Li and Olson 2012): each accepted pair updates the state, and the posterior judges the
-  next, linearised where the pairs before have moved it. Any test costs O(1), an acceptance O(c^2)
-  for c candidate landmarks. After each, all pairs that are left are tested again: the posterior
-  shows which points no landmark can explain any more, and hypotheses that leave out good pairs are
-  cut at once.
+A *hypothesis* gives each point a landmark or none. Searched for is the one with most pairs, and
+among those the one of least cost. As Li and Olson (2012) have it, each accepted pair updates the
+state, and the posterior judges the next, linearised where the pairs before have moved it. Any test
+costs O(1), an acceptance O(c^2) for c candidate landmarks. After each, all pairs that are left are
+tested again: the posterior shows which points no landmark can explain any more, and hypotheses that
+leave out good pairs are cut at once.
 
 On linear problems the costs of IPJC sum up to the joint chi-square of all pairs (chain rule of the
 Gaussian), which joint compatibility branch and bound (Neira and Tardos 2001) tests.
 """
 
-from collections.abc import Callable
 from typing import NamedTuple
 
 import numpy as np
@@ -237,25 +233,6 @@ def visit(  # noqa: C901, PLR0913 (kernel)
         i += 1
 
 
-Associate = Callable[[EkfFilter, Ints, Float, Float, Gates], Association]
-
-
-def individual(
-    state: EkfFilter, chosen: Ints, points: Float, covariances: Float, gates: Gates
-) -> Association:
-    """Nearest neighbours: the cheapest pair of all first, each point and landmark once."""
-    costs = _prior_costs(state, chosen, points, covariances, gates)
-    landmarks, plausible = np.full(len(points), -1), _any(costs)
-    total = 0.0
-    while costs.size and np.isfinite(costs.min()):
-        k, j = np.unravel_index(int(costs.argmin()), costs.shape)
-        total += float(costs[k, j])
-        landmarks[k] = chosen[j]
-        costs[k, :] = np.inf
-        costs[:, j] = np.inf
-    return Association(landmarks=landmarks, cost=total, plausible=plausible)
-
-
 def ipjc(
     state: EkfFilter, chosen: Ints, points: Float, covariances: Float, gates: Gates
 ) -> Association:
@@ -282,9 +259,6 @@ def ipjc(
     found = np.full(len(points), -1)
     found[order] = np.where(search.best >= 0, near[search.best], -1) if k else found[:0]
     return Association(landmarks=found, cost=float(search.best_cost[0]), plausible=_any(costs))
-
-
-METHODS: dict[str, Associate] = {"individual": individual, "ipjc": ipjc}
 
 
 def _prior_costs(

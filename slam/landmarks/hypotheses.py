@@ -42,7 +42,7 @@ class Gates(Settings):
     posterior: float = number(
         0.99999,
         "prob",
-        "chi-square probability of what one more pair adds, 2 dof (IPJC alone)",
+        "chi-square probability of what one more pair adds, 2 dof",
         TUNED,
         low=0.5,
         high=MOST_GATE,

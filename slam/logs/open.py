@@ -35,7 +35,7 @@ FORMATS: tuple[LogFormat, ...] = (
         lambda path, strict: read_bag(path, strict=strict),
     ),
     LogFormat(
-        "Victoria Park (its folder, features_*.mat or rfs_measurements.dat)",
+        "Victoria Park (its folder or features_trees.mat)",
         is_victoria_park,
         lambda path, _: read_victoria_park(path),
     ),

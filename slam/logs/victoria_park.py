@@ -1,14 +1,11 @@
 # SPDX-License-Identifier: Apache-2.0
 """Victoria Park, Sydney (Guivant and Nebot 2001): tree trunks, controls and GPS of a pick-up truck.
 
-Read from the dataset's MATLAB files or from the text files of RFS-SLAM:
+Read from the dataset's MATLAB files:
 
     features_trees.mat      TLsr s, zt (range m, bearing rad from the right, diameter m) per scan,
                             time s, u (speed m/s of the left rear wheel, steering rad)
-    features_segments.mat   laserTime ms, laserData, controlTime ms, controlSpeed, controlSteering
-    rfs_measurements.dat    lines ``t range bearing diameter``, beside rfs_inputs.dat
-                            ``t speed steering``; plain, .gz or .xz
-    aa3_gpsx.mat            timeGps ms, Lo_m, La_m;  or rfs_gps.dat ``t x y``
+    aa3_gpsx.mat            timeGps ms, Lo_m, La_m
 
 The robot frame is the laser's: on the front left bumper, x forward.
 """
@@ -25,14 +22,7 @@ from numpy.typing import NDArray
 from slam import inputs, se2
 from slam.errors import LogFormatError
 from slam.frames import NS_PER_S, Features, Float, Frame, Odometry, Stream, StreamMetadata, to_ns
-from slam.logs.text import (
-    MAX_COORDINATE,
-    MAX_RANGE_M,
-    MAX_STAMP_S,
-    about,
-    number,
-    numbered_lines,
-)
+from slam.logs.text import MAX_COORDINATE, MAX_RANGE_M, MAX_STAMP_S, about
 from slam.logs.unpacking import check_mat
 
 AXLES_M, HALF_TRACK_M = 2.83, 0.76  # L, H
@@ -40,9 +30,7 @@ LASER_AHEAD_M, LASER_LEFT_M = 3.78, 0.50  # a + L (of the rear axle), b
 SPEED_STD, STEERING_STD = 0.25, math.radians(1.5)  # m/s, rad; of the mean over one scan
 RANGE_STD_M, BEARING_STD = 0.25, math.radians(1.0)  # of a trunk: its shape, a beam is 0.5 degrees
 WHERE = "README.md names where to get the dataset"
-MAT_FILES = ("features_trees.mat", "features_segments.mat")
-TEXT_FILE = "rfs_measurements.dat"
-_PACKED = ("", ".xz", ".gz")
+TREES, GPS = "features_trees.mat", "aa3_gpsx.mat"
 MOST_SPEED, MOST_STEERING = 100.0, 1.2  # m/s, rad: of a truck, whose wheels cannot stand across
 Fields = tuple[tuple[str, float], ...]  # columns as errors name them, how far from 0 they may be
 _TIME = ("time", MAX_STAMP_S)
@@ -54,7 +42,7 @@ _MAT_MAGIC = b"MATLAB 5.0 MAT-file"
 
 @dataclass(frozen=True, kw_only=True, eq=False)
 class GpsTrack:
-    """``points`` (n, 2) m east, north (turned by -33 degrees in rfs_gps) at ``stamps_ns`` (n,)."""
+    """``points`` (n, 2) m east, north at ``stamps_ns`` (n,)."""
 
     stamps_ns: NDArray[np.int64]
     points: Float
@@ -70,43 +58,34 @@ class _Drive:
 
 
 def is_victoria_park(path: Path) -> bool:
-    """True for a folder with one of the files, or one of them."""
+    """True for a folder with the trees, or a MATLAB file."""
     if path.is_dir():
-        return _main_file(path) is not None
-    if path.name in {TEXT_FILE + packed for packed in _PACKED}:
-        return True
+        return (path / TREES).is_file()
     if path.suffix != ".mat" or not path.is_file():
         return False
     with path.open("rb") as file:
         return file.read(len(_MAT_MAGIC)) == _MAT_MAGIC
 
 
-def _main_file(folder: Path) -> Path | None:
-    names = [*MAT_FILES, *(TEXT_FILE + packed for packed in _PACKED)]
-    return next((folder / name for name in names if (folder / name).is_file()), None)
-
-
 def read_victoria_park(path: str | Path) -> Stream:
     """The drive as frames of features: one per laser scan, trunks in the laser's frame.
 
-    ``path`` is the folder of the dataset (its trees are read) or one of its feature files. Odometry
+    ``path`` is the folder of the dataset or the file of its trees. Odometry
     chains the vehicle model over the 40 Hz controls up to each scan. No truth: GPS, which gives no
     heading and has gaps of minutes, is for ``read_gps``; ``metadata.extra`` says if it is there.
     Raises ``LogFormatError`` where files are missing, damaged or out of order.
     """
     given = Path(path)
-    main = _main_file(given) if given.is_dir() else given
-    if main is None or not main.is_file():
-        raise LogFormatError(given, f"no Victoria Park here (no {', '.join(MAT_FILES)} or "
-                             f"{TEXT_FILE}); {WHERE}")  # fmt: skip
-    drive = _from_mat(main) if main.suffix == ".mat" else _from_text(main)
+    main = given / TREES if given.is_dir() else given
+    if not main.is_file():
+        raise LogFormatError(given, f"no Victoria Park here (no {TREES}); {WHERE}")
+    drive = _drive(main)
     _check(main, drive)
-    gps = _gps_file(main.parent)
     extra: dict[str, Any] = {
         "file": main.name,
         "detections": sum(len(found) for found in drive.detections),
         "controls": len(drive.controls),
-        "gps_file": gps.name if gps else None,
+        "gps_file": GPS if main.with_name(GPS).is_file() else None,
     }
     metadata = StreamMetadata(source="victoria_park", robot="pick-up truck", extra=extra)
     return Stream(
@@ -115,27 +94,19 @@ def read_victoria_park(path: str | Path) -> Stream:
 
 
 def read_gps(path: str | Path) -> GpsTrack:
-    """The GPS fixes of the folder ``path``, or of one of its two GPS files."""
+    """The GPS fixes of the folder ``path``, or of its GPS file."""
     given = Path(path)
-    file = _gps_file(given) if given.is_dir() else given
-    if file is None or not file.is_file():
-        raise LogFormatError(given, f"no GPS here (no aa3_gpsx.mat or rfs_gps.dat); {WHERE}")
-    if file.suffix == ".mat":
-        values = _load(file)
-        names = ("timeGps", "Lo_m", "La_m")
-        with about(file, "times and places"):
-            table = np.column_stack([_row(file, values, name) for name in names])
-        table[:, 0] /= 1000.0
-        _within(file, "fix", table, _FIX)
-    else:
-        table = _table(file, _FIX)
+    file = given / GPS if given.is_dir() else given
+    if not file.is_file():
+        raise LogFormatError(given, f"no GPS here (no {GPS}); {WHERE}")
+    values = _load(file)
+    names = ("timeGps", "Lo_m", "La_m")
+    with about(file, "times and places"):
+        table = np.column_stack([_row(file, values, name) for name in names])
+    table[:, 0] /= 1000.0
+    _within(file, "fix", table, _FIX)
     stamps_ns = np.array([to_ns(t) for t in table[:, 0].tolist()], dtype=np.int64)
     return GpsTrack(stamps_ns=stamps_ns, points=table[:, 1:])
-
-
-def _gps_file(folder: Path) -> Path | None:
-    names = ["aa3_gpsx.mat", *("rfs_gps.dat" + packed for packed in _PACKED)]
-    return next((folder / name for name in names if (folder / name).is_file()), None)
 
 
 def _load(path: Path) -> dict[str, Any]:
@@ -164,22 +135,18 @@ def _row(path: Path, values: dict[str, Any], name: str) -> Float:
         raise LogFormatError(path, f"'{name}' is not numeric: {error}") from error
 
 
-def _from_mat(path: Path) -> _Drive:
+def _drive(path: Path) -> _Drive:
     values = _load(path)
-    if "zt" in values:
-        times, cells = _row(path, values, "TLsr"), values["zt"]
-        with about(path, "'u', speed and steering angle"):
-            u = _row(path, values, "u").reshape(2, -1)
-        control_times, speed, steering = _row(path, values, "time"), u[0], u[1]
-    else:
-        times, cells = _row(path, values, "laserTime") / 1000.0, values.get("laserData", [])
-        control_times = _row(path, values, "controlTime") / 1000.0
-        speed, steering = (_row(path, values, f"control{k}") for k in ("Speed", "Steering"))
-    if not len(control_times) == len(speed) == len(steering):
+    times = _row(path, values, "TLsr")
+    with about(path, "'u', speed and steering angle"):
+        speed, steering = _row(path, values, "u").reshape(2, -1)
+    control_times = _row(path, values, "time")
+    if len(control_times) != len(speed):
         raise LogFormatError(path, "times, speeds and steering angles differ in number")
+    cells = np.asarray(values.get("zt", []), dtype=object).ravel()
     return _Drive(
         scan_times=times,
-        detections=_cells(path, np.asarray(cells, dtype=object).ravel(), len(times)),
+        detections=_cells(path, cells, len(times)),
         controls=np.column_stack([control_times, speed, steering]),
     )
 
@@ -197,49 +164,8 @@ def _cells(path: Path, cells: NDArray[np.object_], n: int) -> list[Float]:
     return out
 
 
-def _from_text(path: Path) -> _Drive:
-    name = path.name.replace("measurements", "inputs")
-    stem = name.removesuffix(path.suffix) if path.suffix in _PACKED else name
-    inputs = [path.with_name(stem + packed) for packed in _PACKED]
-    beside = next((file for file in inputs if file.is_file()), None)
-    if beside is None:
-        raise LogFormatError(path, f"needs its controls beside it: no {stem} there; {WHERE}")
-    table = _table(path, (_TIME, *_TRUNK))
-    times, first = np.unique(table[:, 0], return_index=True)
-    return _Drive(
-        scan_times=times,
-        detections=[found[:, 1:] for found in np.split(table, first[1:])],
-        controls=_table(beside, _CONTROL),
-    )
-
-
-def _table(path: Path, fields: Fields) -> Float:
-    """Numbers (n, columns) of a text file in the order of time."""
-    rows: list[list[float]] = []
-    for line_number, line in numbered_lines(path):
-        with about(path, line=line_number):
-            row = _numbers(line, fields)
-            if rows and row[0] < rows[-1][0]:
-                raise ValueError(f"time steps back from {rows[-1][0]} to {row[0]} s")
-            if rows and row[0] == rows[-1][0] and fields is _CONTROL:
-                raise ValueError(f"time: the times of the controls do not increase, got {row[0]} s")
-        rows.append(row)
-    return np.array(rows)
-
-
-def _numbers(line: str, fields: Fields) -> list[float]:
-    words = line.split()
-    if len(words) != len(fields):
-        names = ", ".join(name for name, _ in fields)
-        raise ValueError(f"expected {len(fields)} finite numbers ({names}), got {line[:80]!r}")
-    row = [number(word, name, limit) for word, (name, limit) in zip(words, fields, strict=True)]
-    if fields[1] == _TRUNK[0] and row[1] <= 0.0:
-        raise ValueError(f"range: expected a number > 0 m, got {words[1][:40]!r}")
-    return row
-
-
 def _within(path: Path, what: str, rows: Float, fields: Fields) -> None:
-    """The same of numbers from MATLAB files: they have no lines."""
+    """``LogFormatError`` for a number out of bounds."""
     for column, (name, limit) in zip(rows.T, fields, strict=True):
         bad = ~(np.abs(column) <= limit)  # true for NaN too
         if bad.any():

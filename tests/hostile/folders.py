@@ -141,7 +141,7 @@ class Hostile:
         return [*words, "--out", "driven"]
 
     def report(self) -> Path:
-        """A comparison with tables, and a drive beside it, both naming code."""
+        """A comparison with tables, naming code."""
         folder = made.make(self.path / "compared", seeds=(100,))
         settings = json.loads((folder / "recipe.json").read_text())["settings"]
         settings |= {"slams": [self.pipe, SLAM], "scenes": [SCENE]}

@@ -13,9 +13,7 @@ from scripts import exports, formats
 from scripts.spec import command
 from scripts.verbs.export import Export
 from scripts.verbs.generate import Generate
-from slam import create
 from slam.errors import InvalidValueError, LogFormatError, MissingDependencyError
-from slam.evaluation.wide_tum import to_body
 from slam.frames import Stream, StreamMetadata
 from slam.logs import read_bag, read_carmen
 from slam.ros.template import EPOCH_NS
@@ -139,23 +137,3 @@ def test_parquet_has_a_row_a_scan(episode, tmp_path):
     assert told["recipe"]["seed"] == 1
     assert told["label_kind"]["3"] == "moving"
     assert set(told["units"]) == set(table.column_names)
-
-
-def test_poses_with_covariances_are_exported(episode, tmp_path):
-    frames = list(read_bag(episode))
-    export(episode, "smfeval", tmp_path / "a.tum")
-    rows = np.loadtxt(tmp_path / "a_shunting.tum")
-    stamps_s = [(frame.stamp_ns + EPOCH_NS) / 1e9 for frame in frames]
-    np.testing.assert_allclose(rows[:, 0], stamps_s, rtol=0, atol=1e-6)
-    slam = create("shunting")
-    said = [slam.update(frame.without_truth()) for frame in frames]
-    yaws = 2.0 * np.arctan2(rows[:, 6], rows[:, 7])
-    online = np.column_stack([rows[:, 1:3], yaws])
-    np.testing.assert_allclose(online, [e.T_map_robot for e in said], atol=1e-12)
-    lower = [to_body(e.covariance, e.T_map_robot[2])[np.tril_indices(6)] for e in said]
-    np.testing.assert_allclose(rows[:, 8:], lower, atol=1e-9)
-    truth = read_tum(tmp_path / "a_truth.tum").poses
-    np.testing.assert_allclose(truth[0], 0.0, atol=1e-9)  # in the map, as the poses are
-    assert np.hypot(*(truth - online)[:, :2].T).max() < 0.05
-    with pytest.raises(InvalidValueError, match="states none"):
-        export(episode, "smfeval", tmp_path / "b.tum", "karto")

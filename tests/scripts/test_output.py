@@ -7,7 +7,6 @@ from pathlib import Path
 
 import pytest
 
-from scripts.closed_loop.tables import driven
 from scripts.comparison import folder as compared
 from scripts.comparison.again import run_of
 from scripts.names import run_name
@@ -261,7 +260,7 @@ def test_tables_stopped_on_the_way_are_refused_until_the_same_command_goes_on(
     with pytest.raises(KeyboardInterrupt):
         grown("new")
     monkeypatch.undo()
-    for reader in (check_whole, compared.read, driven, lambda out: run_of(out / "runs" / "b.npz")):
+    for reader in (check_whole, compared.read, lambda out: run_of(out / "runs" / "b.npz")):
         with pytest.raises(LogFormatError, match=r"unfinished, .*: the same command again goes on"):
             reader(tmp_path / "out")
     grown("new")

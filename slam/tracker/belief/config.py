@@ -5,7 +5,6 @@ from dataclasses import dataclass
 
 from slam.settings import Settings, number
 
-NOT_FIT = "by hand: scripts.experiments.fit_belief gives others (docs/belief.md)"
 TRACES = "by hand, on traces of Freiburg 079 and of robots carried in the plane"
 
 
@@ -14,13 +13,13 @@ class BeliefConfig(Settings):
     """What a scan says of where the robot is, in nats: docs/belief.md."""
 
     slope: float = number(
-        3.3, "nats", "a: of a share s of the returns that are explained, a logit(s)", NOT_FIT
+        3.3, "nats", "a: of a share s of the returns that are explained, a logit(s)"
     )
     known: float = number(
         0.0, "nats", "b: added for where motion led, s being the share of the second before",
-        NOT_FIT, low=-100.0,
+        low=-100.0,
     )  # fmt: skip
-    new: float = number(2.0, "nats", "less than that for a place that is found", NOT_FIT)
+    new: float = number(2.0, "nats", "less than that for a place that is found")
     best: float = number(
         1.6, "nats", "less for one found in the whole map: the best of all is better than any one"
     )

@@ -8,10 +8,8 @@ from typing import Any
 
 import numpy as np
 
-from scripts.closed_loop import tables as drives
 from scripts.comparison import folder as files
 from scripts.comparison import schema, tables
-from scripts.comparison.tables import write_checked
 from scripts.days import scores
 from scripts.days.lifelong import COLUMNS as SESSION
 from scripts.output import write_recipe
@@ -138,23 +136,3 @@ def session_of(slam: str, number: int, seed: int) -> dict[str, Any]:
             "start": "known", "ghost_rate": 0.01 + 0.002 * number, "recall": 0.9, "map_kb": 340.0,
         }  # fmt: skip
     return row
-
-
-def make_drive(folder: Path, reached: int = 6) -> Path:
-    """What ``mobilia drive`` writes, as far as a report reads it; "own" never arrives."""
-    rows = []
-    for slam, count in ((OURS, reached), ("own", 0)):
-        for level in LEVELS:
-            arrived = {"precision_m": 0.12, "precision_m_low": 0.1, "precision_m_high": 0.2}
-            rows.append({
-                "scene": SCENE, "dynamism": level, "slam": slam, "runs": 2, "goals": 8,
-                "reached": count, "success": count / 8, "success_low": 0.1 * count,
-                "success_high": 0.95, "wrong": 1, "given_up": 0, "given_up_taken": 0, "failed": 0,
-                "time_s": 20.0, "collisions_per_km": 1.5, "near_misses_per_km": 0.0, "runs_lost": 1,
-                "runs_recovered": 1, **(arrived if count else {}),
-            })  # fmt: skip
-    folder.mkdir(parents=True)
-    loop = {"tolerance_m": 0.5, "plan_on": "layout"}
-    write_recipe(folder, "drive", {"drive_schema": 1, "loop": loop})
-    write_checked(folder / "levels.csv", rows, drives.TABLE)
-    return folder

@@ -10,7 +10,6 @@ import numpy as np
 import pytest
 
 from scripts import results
-from scripts.closed_loop.tables import driven
 from scripts.comparison.folder import read, write_table
 from scripts.comparison.plan import Plan
 from scripts.report import pictures
@@ -21,20 +20,12 @@ from tests.scripts.report import made
 
 pytestmark = pytest.mark.film
 
-# What ``verify`` wants to be there, and no report reads.
-UNREAD = (
-    "drive/runs.csv", "drive/goals.csv", "drive/closed_loop.png", "drive/paths.png",
-)  # fmt: skip
-
 
 @pytest.fixture(scope="module")
 def whole(tmp_path_factory: pytest.TempPathFactory) -> Path:
-    """One seed at two levels, with buildings and a drive."""
+    """One seed at two levels, with buildings."""
     folder = made.make(tmp_path_factory.mktemp("damaged") / "compare", seeds=(100,))
     made.add_days(folder, buildings=1)
-    made.make_drive(folder / "drive")
-    for name in UNREAD:
-        (folder / name).write_text("x")
     return folder
 
 
@@ -46,12 +37,10 @@ def folder(whole: Path, tmp_path: Path) -> Path:
 def read_all(folder: Path) -> None:
     """All that a report of it could read."""
     study(folder).compared.check()
-    driven(folder / "drive")
 
 
 def well(folder: Path) -> bool:
     """Whether ``verify`` calls it well, all hashes being right."""
-    write_sums(folder / "drive")
     write_sums(folder)
     return all(found.ok for found in results.check(folder))
 

@@ -52,7 +52,7 @@ def test_only_a_comparison_with_buildings_has_it_in_the_contents_and_the_command
     text: str, tmp_path: Path
 ):
     assert '<a href="#days">Over days</a>' in text
-    assert "--change 0.3 --sessions 5 --seeds 6" in text
+    assert "--change 0.3 --sessions 5" in text
     without = page.render(study(made.make(tmp_path / "compare")))
     assert "days" not in without
     assert "sessions" not in without

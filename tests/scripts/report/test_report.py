@@ -12,7 +12,6 @@ import pytest
 from typer.testing import CliRunner
 
 from scripts import cli
-from scripts.closed_loop.tables import driven
 from scripts.comparison import folder as files
 from scripts.metrics.table import METRICS, digits
 from scripts.report import page, tables
@@ -110,38 +109,6 @@ def kept(folder: Path, keep) -> None:
     recipe["settings"]["slams"] = list(dict.fromkeys(row["slam"] for row in rows))
     recipe["settings"]["levels"] = sorted({row["dynamism"] for row in rows})
     (folder / "recipe.json").write_text(json.dumps(recipe))
-
-
-def test_a_drive_beside_the_comparison_is_told_too(folder: Path, tmp_path: Path):
-    drive = driven(made.make_drive(tmp_path / "drive"))
-    assert drive.levels == [0.0, 1.0]
-    shown = [[(cell.text, cell.small) for cell in row] for row in tables.of_drive(drive).rows]
-    assert shown[1][:4] == [("shunting", ""), ("1", ""), ("6 of 8", "60 to 95 %"), ("1", "")]
-    assert shown[1][6] == ("12.0", "10.0 to 20.0")
-    assert shown[3][6] == ("–", "")  # another SLAM, which believed itself nowhere
-    few = tables.of_drive(driven(made.make_drive(tmp_path / "few", reached=4))).rows[1]
-    assert (few[2].small, few[6].small) == ("40 to 95 %", "")  # five distances are no interval
-    text = page.render(study(folder), [drive])
-    assert text.count("<svg") == page.render(study(folder)).count("<svg") + 2
-    assert "ways planned on the layout" in text
-
-
-DRIVE = '{"command": "drive", "settings": {"drive_schema": 1, "loop": {"plan_on": 3}}}'
-
-
-@pytest.mark.parametrize(
-    ("name", "content", "says"),
-    [("recipe.json", "{}", "lacks command, which must be drive"),
-     ("recipe.json", DRIVE.replace("1", "2"), "no closed-loop drive of schema 1"),
-     ("recipe.json", DRIVE, "settings.loop.plan_on must be one of layout, map"),
-     ("levels.csv", "scene,dynamism\n", "a table without the column 'slam'"),
-     ("levels.csv", "scene,slam\na,b\n", "a table without the column 'dynamism'")],
-)  # fmt: skip
-def test_what_is_no_drive_is_told(tmp_path: Path, name: str, content: str, says: str):
-    folder = made.make_drive(tmp_path / "drive")
-    (folder / name).write_text(content)
-    with pytest.raises(LogFormatError, match=says):
-        driven(folder)
 
 
 def test_the_page_is_about_whom_one_asks(written: Path, tmp_path: Path):
@@ -276,7 +243,7 @@ def other_folder(tmp_path: Path, kind: str) -> Path:
         ("run", "is of mobilia run: a report is about a comparison, mobilia compare --slam"),
         ("dataset", "is a dataset of mobilia generate"),
         ("episode", "is an episode of mobilia generate"),
-        ("drive", "mobilia report COMPARISON --drive"),
+        ("drive", "index.html there is its page"),
         ("benchmark", "index.html there is its page"),
         ("compare", "is unfinished: the same mobilia compare again goes on"),
         ("empty", "holds no comparison: mobilia compare --slam A B --out DIR"),

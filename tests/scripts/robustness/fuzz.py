@@ -99,7 +99,6 @@ READERS: dict[str, Callable[[Path], Any]] = {
     ),
     **dict.fromkeys(LOGS, log),
     "sqlite": lambda at: list(open_log(at)),
-    "park": lambda at: list(open_log(at)),
     "recipe": lambda at: read_recipe(at / "recipe.json"),
     "compared": lambda at: read_recipe_words(at / "recipe.json"),
     "tables": lambda at: [read_csv(f, TABLES[f.name]) for f in sorted(at.iterdir())],

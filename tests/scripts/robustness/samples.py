@@ -14,7 +14,6 @@ import numpy as np
 from scripts import results
 from scripts.closed_loop import make as drives
 from scripts.closed_loop.plan import DrivePlan
-from scripts.closed_loop.tables import driven
 from scripts.comparison import make as comparisons
 from scripts.comparison.folder import read
 from scripts.comparison.plan import Plan
@@ -111,18 +110,13 @@ def _runs(folder: Path) -> Any:
 
 
 def _driven(folder: Path) -> Any:
-    found = driven(folder)
-    return repr(found.settings), repr(found.rows)
-
-
-def _driven_again(folder: Path) -> Any:
     drives.carry_out(DRIVEN, folder)
-    return _driven(folder)
+    return (folder / drives.LEVELS).read_text()
 
 
 READERS: dict[str, tuple[Callable[[Path], Any], ...]] = {
     "comparison": (lambda folder: page.render(study(folder)), _resumed, _runs),
-    "drive": (_driven_again, _driven),
+    "drive": (_driven,),
     "map": (_loaded,),
 }
 

@@ -153,7 +153,6 @@ def logs() -> dict[str, dict[str, str | bytes]]:
         "rawlog": {"a.rawlog": b"".join(drive())},
         "ticks": {"a.csv": rows["ticks"], "a.toml": TICKS},
         "poses": {"a.csv": rows["poses"], "a.toml": POSES},
-        "park": {"rfs_measurements.dat": rows["trunks"], "rfs_inputs.dat": rows["controls"]},
         "recipe": {RECIPE: (folder / RECIPE).read_bytes()},
         **{k: {"a.log": rows[k]} for k in PLAIN},
     }  # fmt: skip

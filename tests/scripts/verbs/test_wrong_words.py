@@ -97,8 +97,6 @@ WRONG = [
     ("generate arena --format hdf5", "--format must be one of mcap, db3, parquet, npz, carmen,"),
     ("bench --against --page nosuch/x.md", "nosuch/x.md: no such file: it must have the place"),
     ("bench --json .", "--json must be a file, got folder ."),
-    ("export none.mcap --to tum --slam ekf", "--slam is for --to smfeval, got --to tum"),
-    ("export none.mcap --to smfeval --slam shuntin", "no SLAM is called 'shuntin'"),
     ("export none.mcap --to carmen --out .", "--out must be a file, got folder ."),
     ("render absent", "absent: no such file"),
     ("report no", "no such folder: mobilia compare"),

@@ -10,6 +10,7 @@ from gymnasium.utils.env_checker import check_env, data_equivalence
 
 import sim  # noqa: F401  (registers the environments)
 from sim.gym.env import MobiliaEnv
+from sim.sensors.lidar.models.lms221 import Lms221Config
 from sim.view import gl
 from slam.errors import InvalidValueError, MobiliaError
 
@@ -128,10 +129,8 @@ def test_an_episode_can_have_its_own_counts_rates_laser_and_start():
         options={
             "n_chairs": 2,
             "crowd": "none",  # nobody stands where it starts
-            "rates": {"chair_push_rate": 0.3},
-            "moving_share": 1.0,
-            "resolution_deg": 1.0,
-            "noise_std_m": 0.0,
+            "rates": {"chair_push_rate": 0.3, "moving_share": 1.0},
+            "laser": Lms221Config(resolution_deg=1.0, noise_std_m=0.0),
             "start": start,
         },
     )

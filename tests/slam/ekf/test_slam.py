@@ -79,15 +79,6 @@ def test_half_of_the_points_may_move():
         assert len(system.filter) < 130
 
 
-def test_joint_association_is_what_carries_the_run():
-    """Nearest neighbours with 0.1 m and 0.03 rad steps: worse on the very same frames."""
-    world = PointWorld(PointWorldConfig(n_points=400, n_steps=100), seed=1)
-    joint, _ = run(EkfSlam(), world.stream())
-    alone, _ = run(EkfSlam(association="individual"), world.stream())
-    assert rmse(joint) < 0.05
-    assert rmse(alone) > 2.0 * rmse(joint)
-
-
 def test_corners_of_an_arena_are_enough():
     frames = world2d.frames(
         world2d.World2D(world2d.arena(), world2d.Chairs.random(12, (-4, -3, 4, 3), 20.0, 0.0, 0)),
@@ -105,10 +96,9 @@ def test_corners_of_an_arena_are_enough():
     assert np.all(ellipses[:, 3] > 0.0)
 
 
-@pytest.mark.parametrize("association", ["ipjc", "individual"])
 @pytest.mark.parametrize("exact_odometry", [True, False])
 @pytest.mark.parametrize("exact_in", ["all", "range"])
-def test_exact_features_and_odometry_do_not_end_a_run(association, exact_odometry, exact_in):
+def test_exact_features_and_odometry_do_not_end_a_run(exact_odometry, exact_in):
     """Covariances of rank 0 and 1, as a simulator may state them."""
     odometry_std = (1e-9, 1e-9) if exact_odometry else (0.1, 0.03)
     config = PointWorldConfig(n_steps=12, sensor_std=(1e-9, 1e-9), odometry_std=odometry_std)
@@ -123,7 +113,7 @@ def test_exact_features_and_odometry_do_not_end_a_run(association, exact_odometr
             odometry = replace(odometry, increment_covariance=np.zeros((3, 3)))
         features = replace(frame.features, covariances=covariances)
         frames.append(replace(frame, features=features, odometry=odometry))
-    system = EkfSlam(association=association)
+    system = EkfSlam()
     errors = [
         system.update(frame.without_truth()).T_map_robot - se2.between(frames[0].truth, frame.truth)
         for frame in frames
@@ -228,7 +218,7 @@ def test_the_same_bytes_without_the_vector_units_of_the_cpu():
     )
     runs = [
         ({"occluder_m": 0.3}, points),
-        ({"association": "individual", "individual_gate": 0.99}, points[:8]),
+        ({"individual_gate": 0.99}, points[:8]),
         ({"preset": "corners"}, scans),
     ]
     found = np.show_config(mode="dicts")["SIMD Extensions"].get("found", [])

@@ -9,7 +9,7 @@ from scipy.stats import chi2
 
 from slam import se2
 from slam.landmarks import kernels
-from slam.landmarks.association import METHODS, individual, ipjc
+from slam.landmarks.association import ipjc
 from slam.landmarks.filter import EkfFilter
 from slam.landmarks.hypotheses import Gates, chi_square
 
@@ -91,7 +91,7 @@ def test_the_best_of_all_hypotheses_is_found_on_linear_problems(seed):
     assert answer.cost == pytest.approx(-best[1], rel=1e-4)
 
 
-def test_a_shared_error_of_the_pose_is_seen_only_jointly():
+def test_a_shared_error_of_the_pose_is_seen_jointly():
     """Points 0.35 m apart, the robot 0.4 m off along them: alone each has a better neighbour."""
     line = np.array([[3.0 + 0.35 * k, 1.0] for k in range(4)])
     ekf = EkfFilter()
@@ -99,8 +99,6 @@ def test_a_shared_error_of_the_pose_is_seen_only_jointly():
     ekf.predict(np.zeros(3), spread(0.3, 0.05, 0.001))
     # all four are seen, 0.3 m nearer than they should be
     points, R = line - [0.3, 0.0], np.tile(spread(0.01, 0.01), (4, 1, 1))
-    lone = individual(ekf, np.arange(4), points, R, GATES)
-    assert lone.landmarks.tolist() != [0, 1, 2, 3]
     assert ipjc(ekf, np.arange(4), points, R, GATES).landmarks.tolist() == [0, 1, 2, 3]
 
 
@@ -115,26 +113,22 @@ def test_the_posterior_test_survives_curvature():
     assert found >= 0.95 * 15 * 6
 
 
-@pytest.mark.parametrize("method", METHODS.values())
 @pytest.mark.parametrize("exact", [np.zeros((2, 2)), np.diag([1e-4, 0.0])])
-def test_a_singular_innovation_is_no_pair(method, exact):
+def test_a_singular_innovation_is_no_pair(exact):
     """All known exactly, or all but one direction: there is no chi-square to judge by."""
     ekf = EkfFilter()
     ekf.add(np.array([[2.0, 0.0], [3.0, 1.0]]), np.zeros((2, 2, 2)))
     points = ekf.landmarks + np.array([0.0, 0.01])
-    answer = method(ekf, np.arange(2), points, np.tile(exact, (2, 1, 1)), GATES)
+    answer = ipjc(ekf, np.arange(2), points, np.tile(exact, (2, 1, 1)), GATES)
     assert answer.matched == 0
 
 
 def test_nothing_seen_or_known_matches_nothing():
     scene = Scene(0)
-    for method in METHODS.values():
-        none = method(scene.ekf, scene.chosen, np.zeros((0, 2)), np.zeros((0, 2, 2)), GATES)
-        assert len(none.landmarks) == 0
-        unknown = method(
-            scene.ekf, np.zeros(0, dtype=np.int64), scene.points, scene.covariances, GATES
-        )
-        assert unknown.matched == 0
-        assert not unknown.plausible.any()
-        far = method(scene.ekf, scene.chosen, scene.points + 100.0, scene.covariances, GATES)
-        assert far.matched == 0
+    none = ipjc(scene.ekf, scene.chosen, np.zeros((0, 2)), np.zeros((0, 2, 2)), GATES)
+    assert len(none.landmarks) == 0
+    unknown = ipjc(scene.ekf, np.zeros(0, dtype=np.int64), scene.points, scene.covariances, GATES)
+    assert unknown.matched == 0
+    assert not unknown.plausible.any()
+    far = ipjc(scene.ekf, scene.chosen, scene.points + 100.0, scene.covariances, GATES)
+    assert far.matched == 0

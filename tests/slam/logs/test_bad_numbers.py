@@ -13,7 +13,6 @@ import tests.slam.logs.mrpt_objects as mrpt
 from slam.errors import LogFormatError
 from slam.logs import open_log, read_bag
 from slam.logs.victoria_graph import read_graph
-from slam.logs.victoria_park import read_gps
 from tests.slam.logs.conftest import CarmenText
 from tests.slam.logs.test_centimetre import lines as centimetre_lines
 from tests.slam.logs.test_rover import POSES, RANGES, TICKS
@@ -56,14 +55,6 @@ def poses():
     return [f"{0.1 * k},{0.2 * k},-1.0,90,1,2,3,4,5\n" for k in range(4)]
 
 
-def trunks():
-    return [f"{1.0 + k} 2.0 1.5 0.3\n" for k in range(4)]
-
-
-def controls():
-    return [f"{0.5 + k} 1.0 0.1\n" for k in range(4)]
-
-
 def graph():
     edge = "1.0 0.0 0.1 1 0 0 1 0 1"
     return [f"ODOMETRY p0 p1 {edge}\n", "LANDMARK p1 l0 2.0 1.0 0.4 0 0.4\n"]
@@ -71,26 +62,19 @@ def graph():
 
 def made(folder, name, rows):
     """A log of these lines, what is beside it, and what reads it."""
-    path = folder / FILES.get(name, "a.log")
+    path = folder / "a.log"
     path.write_text("".join(rows))
-    if name in ("trunks", "controls"):
-        other, its = ("inputs", controls()) if name == "trunks" else ("measurements", trunks())
-        (folder / f"rfs_{other}.dat").write_text("".join(its))
-        return path, lambda: list(open_log(folder))
     if name in ("ticks", "poses"):
         toml = folder / "a.toml"
         toml.write_text(TICKS if name == "ticks" else POSES)
         return path, lambda: list(open_log(path, text_format=toml))
-    read = {"graph": lambda: [read_graph(path)], "gps": lambda: [read_gps(folder)]}
-    return path, read.get(name, lambda: list(open_log(path)))
+    return path, lambda: [read_graph(path)] if name == "graph" else list(open_log(path))
 
 
-FILES = {"trunks": "rfs_measurements.dat", "controls": "rfs_inputs.dat", "gps": "rfs_gps.dat",
-         "graph": "graph_known_association.txt"}  # fmt: skip
 ROWS = {
     "flaser": flaser, "robotlaser": robotlaser, "rawlaser": rawlaser, "reading": reading,
     "parameters": parameters, "centimetre": lambda: centimetre_lines(3, 4), "ticks": ticks,
-    "poses": poses, "trunks": trunks, "controls": controls, "graph": graph, "gps": controls,
+    "poses": poses, "graph": graph,
 }  # fmt: skip
 PLACES = [  # format, line from 0, word from 0, what the error calls it
     ("flaser", 2, 1, "number of beams"),
@@ -112,12 +96,8 @@ PLACES = [  # format, line from 0, word from 0, what the error calls it
     ("ticks", 1, 0, "time: expected a number in column 1"),
     ("ticks", 1, 5, "range: expected a number in column 6"),
     ("poses", 1, 3, "theta: expected a number in column 4"),
-    ("trunks", 1, 0, "time"),
-    ("trunks", 1, 2, "bearing"),
-    ("controls", 1, 1, "speed"),
     ("graph", 0, 4, "dy"),
     ("graph", 1, 5, "sxx"),
-    ("gps", 1, 0, "time"),
 ]
 
 

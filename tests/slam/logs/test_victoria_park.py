@@ -1,7 +1,6 @@
 # SPDX-License-Identifier: Apache-2.0
 """The Victoria Park reader on a synthetic park in the same formats; the real one where it is."""
 
-import lzma
 import math
 from pathlib import Path
 
@@ -57,30 +56,6 @@ class Park:
         savemat(path, values)
         return path
 
-    def write_segments(self, folder: Path) -> Path:
-        path = folder / "features_segments.mat"
-        values = {"laserTime": np.round(1000.0 * self.scan_times), "laserData": self.cells()}
-        values |= {"controlTime": np.round(1000.0 * self.times)}
-        values |= {"controlSpeed": self.speed, "controlSteering": self.steering}
-        savemat(path, values)
-        return path
-
-    def write_text(self, folder: Path, packed: bool) -> Path:
-        measured = "".join(
-            f"{t:.3f} {r:.6f} {b:.6f} {d:.6f}\n"
-            for t, found in zip(self.scan_times, self.detections, strict=True)
-            for r, b, d in found.T
-        )
-        inputs = "".join(
-            f"{t:.3f} {v:.6f} {a:.6f}\n"
-            for t, v, a in zip(self.times, self.speed, self.steering, strict=True)
-        )
-        suffix = ".xz" if packed else ""
-        for name, text in (("rfs_measurements", measured), ("rfs_inputs", inputs)):
-            data = text.encode()
-            (folder / f"{name}.dat{suffix}").write_bytes(lzma.compress(data) if packed else data)
-        return folder / f"rfs_measurements.dat{suffix}"
-
 
 @pytest.fixture(scope="module")
 def park() -> Park:
@@ -100,20 +75,11 @@ def check(stream: Stream, park: Park, tolerance: float) -> None:
         np.testing.assert_allclose(frame.features.points_robot, points, atol=1e-4)
 
 
-def test_trees_segments_and_text_give_the_same_drive(park, tmp_path):
-    for k, (path, tolerance) in enumerate(
-        [
-            (park.write_trees(tmp_path), 1e-9),
-            (park.write_segments(tmp_path), 1e-9),
-            (park.write_text(tmp_path, packed=False), 1e-3),
-            (park.write_text(tmp_path, packed=True), 1e-3),
-        ]
-    ):
+def test_the_trees_give_the_drive_by_their_file_and_by_their_folder(park, tmp_path):
+    for path in (park.write_trees(tmp_path), tmp_path):
         stream = open_log(path)
-        assert stream.metadata.source == "victoria_park", k
-        check(stream, park, tolerance)
-    check(open_log(tmp_path), park, 1e-9)  # a folder: the trees come first
-    assert open_log(tmp_path).metadata.extra["file"] == "features_trees.mat"
+        assert stream.metadata.source == "victoria_park"
+        check(stream, park, 1e-9)
 
 
 def test_the_vehicle_model_is_that_of_the_dataset():
@@ -132,20 +98,16 @@ def test_the_vehicle_model_is_that_of_the_dataset():
     np.testing.assert_allclose(moved / dt, expected, atol=1e-5)
 
 
-def test_gps_is_read_from_both_formats(tmp_path):
+def test_gps_is_read_in_seconds(tmp_path):
     t = np.array([1000.0, 1200.0, 1400.0])
     x, y = np.array([1.0, 2.0, 3.0]), np.array([4.0, 5.0, 6.0])
-    text = tmp_path / "rfs_gps.dat"
-    text.write_text("".join(f"{a / 1000.0} {b} {c}\n" for a, b, c in zip(t, x, y, strict=True)))
-    from_text = read_gps(text)
     savemat(tmp_path / "aa3_gpsx.mat", {"timeGps": t[:, None], "Lo_m": x, "La_m": y})
-    from_mat = read_gps(tmp_path)
-    np.testing.assert_array_equal(from_text.points, from_mat.points)
-    assert (
-        from_mat.stamps_ns.tolist()
-        == from_text.stamps_ns.tolist()
-        == [10**9, 12 * 10**8, 14 * 10**8]
-    )
+    found = read_gps(tmp_path)
+    np.testing.assert_array_equal(found.points, np.column_stack([x, y]))
+    assert found.stamps_ns.tolist() == [10**9, 12 * 10**8, 14 * 10**8]
+    savemat(tmp_path / "aa3_gpsx.mat", {"timeGps": t, "Lo_m": x, "La_m": y * np.nan})
+    with pytest.raises(LogFormatError, match="fix 0, y: expected a number"):
+        read_gps(tmp_path)
 
 
 def test_without_data_the_error_says_so(tmp_path):
@@ -154,20 +116,6 @@ def test_without_data_the_error_says_so(tmp_path):
             read_victoria_park(path)
     with pytest.raises(LogFormatError, match="no GPS here"):
         read_gps(tmp_path)
-    (tmp_path / "rfs_measurements.dat").write_text("1.0 2.0 1.5 0.3\n")
-    with pytest.raises(LogFormatError, match=r"no rfs_inputs\.dat"):
-        open_log(tmp_path)
-
-
-@pytest.mark.parametrize(
-    ("line", "message"),
-    [("1.0 2.0", "4 finite"), ("0.1 2 1 1", "steps back"), ("2.0 -1.0 1.0 0.3", "> 0 m")],
-)
-def test_damaged_text_is_refused_with_its_line(tmp_path, line, message):
-    (tmp_path / "rfs_measurements.dat").write_text(f"1.0 2.0 1.5 0.3\n{line}\n")
-    (tmp_path / "rfs_inputs.dat").write_text("0.9 1.0 0.0\n1.1 1.0 0.0\n")
-    with pytest.raises(LogFormatError, match=message):
-        open_log(tmp_path / "rfs_measurements.dat")
 
 
 def test_damaged_matlab_files_are_refused(park, tmp_path):
