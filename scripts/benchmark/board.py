@@ -91,15 +91,6 @@ class Board:
         """Its rows, track by track."""
         return [row for row in self.rows if row["slam"] == slam]
 
-    def worst(self) -> list[str]:
-        """The subject's tracks by the share of its runs lost there, most first, then by error."""
-
-        def badness(row: Row) -> tuple[float, float]:
-            error = row[TRACKING]
-            return row["lost_runs"] / row["runs"], math.inf if error is None else error
-
-        return [row["track"] for row in sorted(self.of(self.subject), key=badness, reverse=True)]
-
     def failures(self) -> list[str]:
         """One line for each SLAM and track where it raised, hung or answered nonsense."""
         return [f"{head}: {told}" for head, told in self._failures()]

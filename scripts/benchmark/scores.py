@@ -287,3 +287,13 @@ def lost_by_track(
         track: lost_of(rows, sum(row["slam"] == subject for row in rows))
         for track, rows in found.items()
     }
+
+
+def worst(rows: Iterable[Row]) -> list[str]:
+    """The tracks by the share of runs lost there, most first, then by error; rows of one SLAM."""
+
+    def badness(row: Row) -> tuple[float, float]:
+        error = row[TRACKING]
+        return row["lost_runs"] / row["runs"], math.inf if error is None else error
+
+    return [row["track"] for row in sorted(rows, key=badness, reverse=True)]

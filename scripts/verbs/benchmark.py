@@ -158,13 +158,16 @@ def _tell(board: "Board", out: Path, spent_s: float) -> None:
 
 
 def _page(board: "Board", out: Path, said: list[str], parts: list["Part"]) -> None:
+    from scripts.benchmark.scores import worst
     from scripts.pages.page import Page, publish
 
     head = board.head
     then = {}
     if head["seconds"] is None and head["seeds_of"] == "test":  # else it is for trying out
         then["Hand it in:"] = command_line("benchmark", slam=board.subject, submit="NAME", out=out)
-    reports = [command_line("report", folder=out / name) for name in board.worst()[:3]]
+    reports = [
+        command_line("report", folder=out / name) for name in worst(board.of(board.subject))[:3]
+    ]
     publish(out, Page(
         title=f"{board.subject} on {len(board.tracks)} track{'s' * (len(board.tracks) > 1)}",
         said=said, parts=parts,

@@ -179,7 +179,7 @@ def test_its_worst_tracks_come_first():
     lost = ([[0, 0, 0, 0, 1]], [[0, 1, 1, 1, 1]])
     rows = {t.name: runs("mine", of) for t, of in zip(TWO, lost, strict=True)}
     made = Board(subject="mine", head={"seeds": [720]}, tracks=TWO, runs=rows)
-    assert made.worst() == ["no-walls-v1", "tour-guide-v1"]
+    assert scores.worst(made.of(made.subject)) == ["no-walls-v1", "tour-guide-v1"]
 
 
 def test_over_all_tracks_each_room_is_a_run_and_the_subject_gets_a_place():
