@@ -185,5 +185,3 @@ def test_the_observation_follows_the_scanner(laser: str) -> None:
         np.testing.assert_array_equal(many["ranges"][0], one["ranges"])
     env.reset(options={"laser": "tim561"})
     assert env.unwrapped.observation_space["ranges"].shape == (811,)
-    with pytest.raises(InvalidValueError, match=r"noise_std_m is of the LMS-221, not of .*tim561"):
-        env.reset(options={"laser": "tim561", "noise_std_m": 0.0})

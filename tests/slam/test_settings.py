@@ -109,7 +109,7 @@ def test_the_digest_changes_with_every_number_that_can_be_set(name: str) -> None
 @pytest.mark.parametrize("name", CONFIGURABLE)
 def test_every_number_has_unit_meaning_source_and_bounds(name: str) -> None:
     rows = list(default_of(name).rows())
-    assert len(rows) >= 12
+    assert len(rows) > 10
     assert sum(row.about.fixed for row in rows) <= 6  # the way out for compiled kernels
     for row in rows:
         about = row.about

@@ -8,6 +8,7 @@ import pytest
 import typer
 from typer.testing import CliRunner
 
+from scripts import engine
 from scripts.comparison import folder, make
 from scripts.comparison.plan import Plan
 from scripts.option_names import Verb
@@ -149,6 +150,7 @@ def test_the_command_line_of_the_readme(monkeypatch):
         return []
 
     monkeypatch.setattr(make, "carry_out", carry_out)
+    monkeypatch.setattr(engine, "try_names", lambda *_: None)
     monkeypatch.setattr(verb, "tell", lambda *_: None)
     line = (
         "--slam shunting,oracle(ekf,moving) ekf my_pkg:MySlam --oracle shunting karto,moving "

@@ -174,7 +174,7 @@ def test_links_and_other_ways_to_say_it_are_the_same_file(tmp_path: Path):
 
 def test_every_path_of_a_verb_is_read_or_written():
     """A new one is to be put here, or ``writes=True``."""
-    read = {"data", "bag", "drive", "episode", "events", "folder", "log", "map_in", "map_yaml",
+    read = {"data", "bag", "episode", "events", "folder", "log", "map_in", "map_yaml",
             "merge", "on", "scene", "text_format"}  # fmt: skip
     paths = [
         one

@@ -3,7 +3,6 @@
 
 import csv
 import json
-from pathlib import Path
 
 import numpy as np
 import pytest
@@ -32,7 +31,8 @@ def test_the_time_of_a_session_is_given_or_the_logs_own():
         session_of("odometry", Maps(map_out="m.npz"), stream)
 
 
-def test_a_session_that_is_not_later_than_the_map_is_asked_for_its_time(monkeypatch):
+def test_a_session_that_is_not_later_than_the_map_is_asked_for_its_time(monkeypatch, tmp_path):
+    (tmp_path / "m.npz").touch()
     seen = Snapshot(time_s=5.0, cells=np.zeros((1, 2), np.int32), standing=np.ones(1, np.float32))
     history = History(cell_m=0.1, sessions=(seen,))
     monkeypatch.setattr("scripts.single_run.run.read_history", lambda _: history)
@@ -40,7 +40,7 @@ def test_a_session_that_is_not_later_than_the_map_is_asked_for_its_time(monkeypa
         metadata=StreamMetadata(source="test", extra={"epoch_ns": 5_000_000_000}), frames=list
     )
     with pytest.raises(InvalidValueError, match=r"begins at 5 s.*at 5 s: say when.*--at 2026-"):
-        session_of("shunting", Maps(map_in=Path("m.npz")), stream)
+        session_of("shunting", Maps(map_in=tmp_path / "m.npz"), stream)
 
 
 def test_a_small_building_is_lived_in(called, tmp_path):

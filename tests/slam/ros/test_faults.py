@@ -10,6 +10,7 @@ import time
 from collections.abc import Callable, Iterator
 from contextlib import closing
 from dataclasses import replace
+from itertools import count
 
 import numpy as np
 import pytest
@@ -27,6 +28,7 @@ from slam.system import create
 from tests.slam.ros.clients import PREFIXES, on, started
 from tests.slam.ros.frames import driven
 
+CABLES = count()
 HZ = 37.5
 CUT_S = 5.0
 ANSWERS = replace(TF, depth=1000)
@@ -94,8 +96,8 @@ def test_of_many_that_speak_only_the_first_that_makes_sense_is_believed(client, 
 @pytest.fixture
 def cable() -> Iterator[tuple[list[str], str, str, Callable[[str], None]]]:
     """Another machine: words that start a program on it, our address, its address, and a switch."""
-    pid = os.getpid()
-    space, ours, theirs = f"mobilia{pid}", f"mob{pid}a", f"mob{pid}b"
+    pid, one = os.getpid(), next(CABLES)  # the last one may still be going
+    space, ours, theirs = f"mobilia{pid}-{one}", f"mob{pid}{one}a", f"mob{pid}{one}b"
     inside = ["ip", "netns", "exec", space]
     if (
         os.geteuid()
@@ -103,7 +105,8 @@ def cable() -> Iterator[tuple[list[str], str, str, Callable[[str], None]]]:
         or subprocess.run(["ip", "netns", "add", space]).returncode
     ):
         pytest.skip("needs ip netns, and to be root")
-    here, there = f"10.213.{pid % 256}.1", f"10.213.{pid % 256}.2"
+    net = f"10.213.{(pid + one) % 256}"
+    here, there = f"{net}.1", f"{net}.2"
     for line in (
         f"ip link add {ours} type veth peer name {theirs} netns {space}",
         f"ip addr add {here}/24 dev {ours}", f"ip link set {ours} up",
