@@ -128,6 +128,8 @@ def read_map(yaml: Path, *, saved: bool = False, most_pixels: int = MAX_PIXELS) 
     saved  take the gray 205, which every map_saver writes for unknown, for unknown, though nav2's
            own threshold of 0.25 makes a map_server take it for free
     """
+    if yaml.suffix.lower() in (".pgm", ".png"):
+        raise LogFormatError(yaml, "is an image, expected the YAML file that names it")
     text = text_of(yaml, _MAX_YAML_BYTES)
     image_sum = _checked_sums(yaml, text)
     fields = yaml_in(yaml, text, "map of map_server")

@@ -70,6 +70,7 @@ class Figures:
     walls_near      share of the walls' surface within 5 cm of an occupied cell
     floor_m2        free floor that the robot can get to, in the map
     rooms_m2        of it inside rooms
+    shut_off        m2 of the largest part of the floor that it cannot get to, and a place there
     """
 
     walls: int
@@ -79,6 +80,7 @@ class Figures:
     walls_near: float
     floor_m2: float
     rooms_m2: float
+    shut_off: tuple[float, Point]
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)
@@ -245,6 +247,7 @@ def _figures(
         cells_near=float((gap_to_boxes(cells, boxes) <= NEAR_M).mean()),
         walls_near=float((off <= NEAR_M).mean()) if len(off) else 1.0,
         floor_m2=floor.area_m2,
+        shut_off=floor.shut_off,
         rooms_m2=float(sum((c - a) * (d - b) for a, b, c, d in rects)),
     )
 

@@ -37,6 +37,7 @@ class Survey:
     """What was found, in the frame of the map, m and rad.
 
     rooms    name -> rectangles xmin, ymin, xmax, ymax     area_m2  that the robot can reach
+    shut_off  m2 of the largest part of the floor that it cannot reach, and a place there
     gaps     passages as wide as a door
     bounds   around all rooms and the walls next to them
     ends     (n, 5) boxes that shut the floor off where it ends without a wall
@@ -47,6 +48,7 @@ class Survey:
     rooms: dict[str, tuple[Rect, ...]]
     gaps: tuple[Passage, ...]
     area_m2: float
+    shut_off: tuple[float, Point]
     bounds: Rect
     ends: Float
 
@@ -123,6 +125,7 @@ def survey(  # noqa: PLR0913 (what is known of a building)
         rooms=rooms,
         gaps=tuple(replace(gap, at=cells.in_map(gap.at)) for gap in gaps),
         area_m2=area,
+        shut_off=_shut_off(passable_m, reach, cells, robot_m),
         bounds=bounds,
         ends=_ends(known & cells.rect(bounds), reach, built, cells, robot_m),
     )
@@ -207,6 +210,17 @@ def _bounds_of(rooms: dict[str, tuple[Rect, ...]]) -> Rect:
     rects = np.array([rect for own in rooms.values() for rect in own])
     low, high = rects[:, :2].min(axis=0) - EDGE_M, rects[:, 2:].max(axis=0) + EDGE_M
     return float(low[0]), float(low[1]), float(high[0]), float(high[1])
+
+
+def _shut_off(clear: Float, reach: Mask, cells: Cells, robot_m: float) -> tuple[float, Point]:
+    left = np.where(reach, 0.0, clear)
+    wide = (left >= robot_m + floors.MARGIN_M).astype(np.uint8)
+    _, labels, stats, _ = cv2.connectedComponentsWithStats(wide, connectivity=4)
+    largest = 1 + int(np.argmax(stats[1:, cv2.CC_STAT_AREA])) if len(stats) > 1 else -1
+    part = labels == largest
+    row, column = divmod(int(np.argmax(np.where(part, left, 0.0))), left.shape[1])
+    area = float((_away(part) * cells.cell_m <= robot_m).sum()) * cells.cell_m**2
+    return area, cells.points([(row, column)])[0]
 
 
 def _ends(known: Mask, reach: Mask, built: Mask, cells: Cells, robot_m: float) -> Float:

@@ -43,7 +43,7 @@ MARKS_M, MOST_M = (1e-3, 1e-2, 1e-1, 1.0, 10.0), 30.0  # of the plot's axis, a l
 ANSWER_S = 4.0  # of the wall: so long the title says what was done
 BACK_S = 5.0  # that a key looks back
 HOLD_HZ = 4.0  # twists a second while a key of the pad is held
-SHOVE, CARRY = "shove or open", "carry the robot there"
+SHOVE, CARRY = "push or open", "carry the robot there"
 SPEEDS = ("0.25", "0.5", "1", "2", "5", "10")
 CROWDS = ("the scene's own", "none")
 # as of ROS 2's teleop_twist_keyboard, where viser knows the key

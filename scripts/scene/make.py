@@ -14,7 +14,7 @@ from scenes.from_map import FromMap, MapPlan, plan, write
 from scenes.from_map.floor import Passage
 from scenes.from_map.plan import OCCUPIED
 from scenes.scene import Scene
-from scripts.scene.check import problems
+from scripts.scene.check import LEAST_M2, problems
 from scripts.scene.picture import picture, stands
 from scripts.whole_folder import check_place
 from sim.driving.pilot import tour_of
@@ -41,6 +41,16 @@ class Made:
     files: tuple[Path, ...]
     plan: MapPlan
     seen: "Seen"
+
+    def problems(self) -> Iterator[str]:
+        """What is wrong with the scene, and what of the map is not in it."""
+        yield from self.seen.problems()
+        area, (x, y) = self.plan.figures.shut_off
+        if area >= LEAST_M2:
+            yield (
+                f"{area:.0f} m2 of floor about ({x:.1f}, {y:.1f}) cannot be reached from the "
+                "start: the scene leaves it out"
+            )
 
 
 class Seen:
@@ -164,7 +174,7 @@ def in_words(drawn: MapPlan) -> Iterator[str]:
         f"built; of the walls' faces {100 * f.walls_near:.1f} % within 5 cm of an occupied cell"
     )
     yield (
-        f"floor: {f.floor_m2:.0f} m2 that the robot can reach; {len(drawn.rooms)} rooms with "
+        f"floor: {f.floor_m2:.0f} m2 for the robot's middle; {len(drawn.rooms)} rooms with "
         f"{f.rooms_m2:.0f} m2 in rectangles, {len(drawn.goals)} spots to visit"
     )
     yield (

@@ -43,7 +43,7 @@ class Lifelong:
     moves: options.Moves = part(options.Moves, without=("dynamism", "change"))
     seconds: float = option("Length of a simulated session, s.", 60.0)
     first_seconds: float | None = option(
-        "Of the first one, which maps the building; default three."
+        "Of the first one, which maps the building; default three times as long."
     )
     seed: int = option("Of the building.", 0)
     scanner: str = options.SCANNER()

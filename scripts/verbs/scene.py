@@ -56,7 +56,7 @@ class Parts:
             say(line, highlight=False)
         toml, xml, picture = done.files
         note(f"wrote {toml} (the scene's name), {xml} (walls and rooms) and {picture}")
-        for problem in done.seen.problems():
+        for problem in done.problems():
             fact(f"{toml}: {problem}", bad=True)
 
 

@@ -144,7 +144,7 @@ class MapView:
                 cv2.fillPoly(shadow, [draw.fixed(pixels)], 255, cv2.LINE_AA, draw.SHIFT)
         soft = cv2.GaussianBlur(shadow, (0, 0), max(1.0, 0.09 * self.scale))
         drop = round(0.05 * self.scale)
-        dark = np.roll(soft, (drop, drop), axis=(0, 1)).astype(np.float32) / 255.0
+        dark = np.pad(soft, ((drop, 0), (drop, 0)))[:height, :width].astype(np.float32) / 255.0
         picture[:] = (picture * (1.0 - 0.28 * dark[..., None])).astype(np.uint8)
         for outline in outlines:
             if outline.top < FLOOR_M:

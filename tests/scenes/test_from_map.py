@@ -69,6 +69,16 @@ def test_pieces_of_one_line_become_one_box_but_not_over_a_gap():
     assert min(few.figures.cells_near, few.figures.walls_near) > 0.95
 
 
+def test_floor_that_no_way_leads_to_is_told():
+    raster = two_rooms()
+    assert plan(raster).figures.shut_off[0] == 0.0
+    values = raster.values.copy()
+    values[20:180, 140:142] = 1.0
+    area, (x, y) = plan(replace(raster, values=values)).figures.shut_off
+    assert area == pytest.approx(WIDE / 2 * HIGH, rel=0.2)
+    assert (x, y) == pytest.approx((7.0, 3.0), abs=2.5)
+
+
 def test_a_gap_is_a_door_and_a_small_box_a_thing():
     made = plan(two_rooms())
     (gap,) = made.gaps
