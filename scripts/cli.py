@@ -10,7 +10,7 @@ import typer
 
 from scripts import interrupt
 from scripts.console import COMPILER, LogLines, console, fail, note
-from scripts.option_names import Verb
+from scripts.option_names import Verb, Verbs
 from scripts.spec import command, option, spec, spec_of
 from scripts.verbs.scene import scene
 from slam.errors import InvalidValueError, MissingPathError, MobiliaError, UnknownNameError
@@ -21,6 +21,7 @@ TYPED = (InvalidValueError, UnknownNameError, MissingPathError)  # mistakes in t
 
 app = typer.Typer(
     name="mobilia",
+    cls=Verbs,
     help=(
         "A testbed of rooms in which things move, and a SLAM for them.\n\n"
         "Start with [bold]mobilia demo[/bold]; every verb explains itself with --help."

@@ -185,7 +185,8 @@ def trajectories(
         ax.plot(truth.poses[:, 0], truth.poses[:, 1], "--", color=COLORS["truth"], lw=1.2,
                 label=truth_name)  # fmt: skip
     ax.plot(0.0, 0.0, "k+", ms=9, label="start")
-    ax.set(xlabel="x in m", ylabel="y in m", aspect="equal", title="Trajectories, online")
+    ax.set(xlabel="x in m", ylabel="y in m", title="Trajectories, online")
+    ax.set_aspect("equal", adjustable="datalim")  # the way along a corridor fills no strip
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
     save(figure, path)
 

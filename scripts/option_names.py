@@ -9,7 +9,7 @@ from pathlib import Path
 from typing import Any
 
 from typer import BadParameter
-from typer.core import TyperCommand
+from typer.core import TyperCommand, TyperGroup
 
 from scripts.spec import Option
 from slam import inputs
@@ -23,6 +23,17 @@ _FILLED = ("Recipe", "Plan", "LoopConfig", "Limits", "Rule", "Question", "Pace",
            "Seeds", "Simulation", "World", "FromMap")  # fmt: skip
 _FIELD = re.compile(rf"\b({'|'.join(_FILLED)})\.([a-z_]+)\b")
 _FIRST = re.compile(r"^([a-z_]+)(?=(?:\[\d+\]\.\w+)? must )")
+
+
+class Verbs(TyperGroup):
+    """A group of commands that says in one line which of them it does not know."""
+
+    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
+        """As typer's; ``InvalidValueError`` for an unknown command."""
+        try:
+            return super().resolve_command(ctx, args)
+        except UsageError as error:
+            raise InvalidValueError(error.format_message()) from error
 
 
 class Verb(TyperCommand):

@@ -143,16 +143,19 @@ class Board:
         short = hashlib.sha256(hashes.encode()).hexdigest()[:12]
         about = self.head.get
         return (
-            f"mobilia benchmark, world {about('world')}, {len(self._counting)} tracks that count "
-            f"({short}), levels {_list(about('levels_run'))}, {about('seeds_of')} seeds "
-            f"{_list(about('seeds'))}"
+            f"mobilia benchmark, world {about('world')}, tracks that count: "
+            f"{len(self._counting)} ({short}), levels {_list(about('levels_run'))}, "
+            f"{about('seeds_of')} seeds {_list(about('seeds'))}"
         )
 
     def said(self) -> list[str]:
         """What the reader asked: whether the subject is lost, where, and which place it has."""
         every = self.of(self.subject)
         over = [self._over_all(), self._place()] if self._counting else self._each_track()
-        if min((row["seeds"] for row in every), default=0) < LEAST_RUNS:
+        few = min((row["seeds"] for row in every), default=0) < LEAST_RUNS
+        if few and len(self._counting) == 1:  # what is said over all is said of it
+            return [*filter(None, over)]
+        if few:
             more = f"Track by track it takes `--seeds {LEAST_RUNS}` to tell from which level on."
             return [*filter(None, [*over, self._lost_where()]), more]
         return [*filter(None, over), *self._by_track(every)]

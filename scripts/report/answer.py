@@ -199,9 +199,9 @@ def _seen(of: Standing) -> str:
         return f"{verb} in {lost} of {runs} runs in {of.scene}{already}"
     if len(counts) == 1:
         return f"{verb} in {counts[0].lost} of {runs} runs in {of.scene} at {top}"
-    each = [f"{one.lost} of {one.runs} at {level.at:g}"
-            for one, level in zip(counts, of.levels, strict=True)]  # fmt: skip
-    return f"{verb} in {of.scene} in {listed(each)} ({of.axis})"
+    places = [of.place([of.levels[0].at]), *(f"{level.at:g}" for level in of.levels[1:])]
+    each = [f"{one.lost} of {one.runs} at {at}" for one, at in zip(counts, places, strict=True)]
+    return f"{verb} in {of.scene} in {listed(each)}"
 
 
 def _concluded(of: Standing) -> str:

@@ -86,22 +86,26 @@ def _block(judged: Judged, section: str = "") -> dict[str, Any]:
     return {key: value for key, value in values.items() if value is not None}
 
 
-def said(outcome: Mapping[str, Any], primary: str) -> list[str]:
+def said(outcome: Mapping[str, Any], primary: str, truth_name: str) -> list[str]:
     """What came out for the SLAM ``primary``, beside odometry, and how often it was in doubt."""
     own, others = outcome["slams"][primary], dict(outcome["slams"])
     if "ate_unaligned_m" in own:
-        off = {name: 100.0 * block["end_error_m"] for name, block in others.items()}
-        beside = "".join(f", `{k}` by {digits(v)} cm" for k, v in off.items() if k != primary)
+        off = {name: _length(block["end_error_m"]) for name, block in others.items()}
+        beside = "".join(f", `{k}` by {v}" for k, v in off.items() if k != primary)
+        reference = "" if truth_name == "truth" else f"Against the {truth_name}, "
         first = (
-            f"`{primary}` was off by {digits(100.0 * own['ate_unaligned_m'])} cm on average (RMSE) "
-            f"over {outcome['distance_m']:.0f} m; at the end by {digits(off[primary])} cm{beside}."
+            f"{reference}`{primary}` was off by {_length(own['ate_unaligned_m'])} on average "
+            f"(RMSE) over {outcome['distance_m']:.0f} m; at the end by {off[primary]}{beside}."
         )
     else:
         plural = "" if own["scans"] == 1 else "s"
         first = f"`{primary}` ran through {own['scans']} scan{plural}; without truth, no errors."
     doubted = own.get("not_converged", 0)
-    scans = f"{doubted} of {own['scans']} scans" if doubted else "every scan: it was never in doubt"
-    return [first, f"It {'did not trust' if doubted else 'trusted'} {scans}."]
+    return [first, *([f"It did not trust {doubted} of {own['scans']} scans."] if doubted else [])]
+
+
+def _length(metres: float) -> str:
+    return f"{digits(metres)} m" if metres >= 10.0 else f"{digits(100.0 * metres)} cm"
 
 
 def table(outcome: Mapping[str, Any], title: str) -> Table:

@@ -171,7 +171,8 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         f"Processor time: {cost['slam_s']:.0f} s of SLAM, {cost['rest_s']:.0f} s of all else; "
         f"memory at most {cost['memory_mb']} MB."
     )
-    for words in filter(None, (score.agreement_words(results), spent)):
+    agreed = "" if "scene" in outputs.settings else score.agreement_words(results)
+    for words in filter(None, (agreed, spent)):
         say(escape(words), highlight=False)
     pages.tell(outputs.folder, page)
     return results
@@ -273,8 +274,9 @@ def _page(outputs: Outputs, show: Show, results: Mapping[str, Any], table: Table
         Part(title="Numbers", table=table),
     ]
     settings = {key: value for key, value in outputs.settings.items() if key != "log_facts"}
+    said = score.said(results, show.primary, show.moments.truth_name)
     return Page(
-        title=show.title, said=score.said(results, show.primary), parts=parts,
+        title=show.title, said=said, parts=parts,
         next=_next(outputs, show), settings=settings,
     )  # fmt: skip
 

@@ -161,7 +161,7 @@ def _page(plan: "Plan", out: Path, table: "Table") -> None:
         ],
         parts=[
             Part(title="The first one at its start", picture=start),
-            Part(title="Episode by episode", table=table),
+            Part(title="What they hold", table=table),
         ],
         next={
             "Is every byte still there? FOLDER is that of this page:": command_line(

@@ -12,7 +12,7 @@ from scripts import options
 from scripts.console import fact, note, say, working
 from scripts.names import check as check_names
 from scripts.names import file_name, run_name
-from scripts.option_names import Verb
+from scripts.option_names import Verb, Verbs
 from scripts.spec import REQUIRED, SLAMS, argument, command, option, part, spec
 from slam.errors import InvalidValueError, MobiliaError
 
@@ -20,7 +20,9 @@ if TYPE_CHECKING:
     from scenes.from_map import FromMap
     from slam.estimate import Raster
 
-scene = typer.Typer(help="Make a scene of a map or a log, show it, check it.", no_args_is_help=True)
+scene = typer.Typer(
+    cls=Verbs, help="Make a scene of a map or a log, show it, check it.", no_args_is_help=True
+)
 
 OUT = partial(option, "STEM of STEM.toml, .xml and .png.", writes=True)
 WHICH = partial(argument, "A scene by name, module:function, or its file.", REQUIRED)

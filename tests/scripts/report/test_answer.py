@@ -42,7 +42,7 @@ def of(lost: list[int], *, runs: int = 10, levels=(0.0, 0.4, 1.0), failures=(), 
     [
         (
             of([0, 6, 9], against=[-1, -1, -1]),
-            "was lost in arena in 0 of 10 at 0, 6 of 10 at 0.4 and 9 of 10 at 1 (dynamism); it "
+            "was lost in arena in 0 of 10 at dynamism 0, 6 of 10 at 0.4 and 9 of 10 at 1; it "
             "holds at 0 and is lost at 0.4, so at least 31 % of such runs are lost at 0.4 (95 %); "
             "at 0 it is already worse than its own odometry, so dynamism is not its problem; that "
             "is too near to one half at 0.4 for 50 seeds to tell.",
@@ -60,21 +60,21 @@ def of(lost: list[int], *, runs: int = 10, levels=(0.0, 0.4, 1.0), failures=(), 
         ),
         (
             of([0, 10, 10], oracle=[0, 0, 3]),
-            "was lost in arena in 0 of 10 at 0, 10 of 10 at 0.4 and 10 of 10 at 1 (dynamism); it "
+            "was lost in arena in 0 of 10 at dynamism 0, 10 of 10 at 0.4 and 10 of 10 at 1; it "
             "holds at 0 and is lost at 0.4, so at least 72 % of such runs are lost at 0.4 (95 %); "
             "the oracle fails too at dynamism 1 (3 of 10 runs, 11 to 60 %): the room is unfair "
             "there.",
         ),
         (
             of([0, 10, 10], oracle=[0, 2, 3], own=True),
-            "was lost in arena in 0 of 10 at 0, 10 of 10 at 0.4 and 10 of 10 at 1 (dynamism); it "
+            "was lost in arena in 0 of 10 at dynamism 0, 10 of 10 at 0.4 and 10 of 10 at 1; it "
             "holds at 0 and is lost at 0.4, so at least 72 % of such runs are lost at 0.4 (95 %); "
             "without the returns of movers it is lost too at dynamism 0.4 and 1 (3 of 10 runs, 11 "
             "to 60 % at 1), so they are not its only problem, or the room is unfair.",
         ),
         (
             of([0, 9, 9], failures=[0, 9, 9]),
-            "failed in arena in 0 of 10 at 0, 9 of 10 at 0.4 and 9 of 10 at 1 (dynamism); it holds "
+            "failed in arena in 0 of 10 at dynamism 0, 9 of 10 at 0.4 and 9 of 10 at 1; it holds "
             "at 0 and is lost at 0.4, so at least 60 % of such runs are lost at 0.4 (95 %).",
         ),
         (
@@ -84,7 +84,7 @@ def of(lost: list[int], *, runs: int = 10, levels=(0.0, 0.4, 1.0), failures=(), 
         ),
         (
             of([0, 2], levels=(0.0, 1.0), runs=2),
-            "was lost in arena in 0 of 2 at 0 and 2 of 2 at 1 (dynamism); it holds at 0 and is "
+            "was lost in arena in 0 of 2 at dynamism 0 and 2 of 2 at 1; it holds at 0 and is "
             "lost at 1, so at least 34 % of such runs are lost at 1 (95 %); `--seeds 4` would tell "
             "whether more than half are lost at 0 and 1.",
         ),

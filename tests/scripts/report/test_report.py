@@ -126,7 +126,7 @@ def test_the_page_is_about_whom_one_asks(written: Path, tmp_path: Path):
     )  # it hung: nobody misled it
     failure = "`own:Hanging` hung in 6 of 12 runs, first in room at dynamism 1, seed 100: SLAM "
     assert failure in done.output
-    assert "`own:Hanging` failed in room in 0 of 6 at 0 and 6 of 6 at 1 (dynamism)" in done.output
+    assert "`own:Hanging` failed in room in 0 of 6 at dynamism 0 and 6 of 6 at 1" in done.output
 
 
 class Addresses(HTMLParser):
