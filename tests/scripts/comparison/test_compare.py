@@ -149,8 +149,9 @@ def test_the_command_line_of_the_readme(monkeypatch):
         seen.update(plan=plan, out=out, ways=ways)
         return []
 
-    monkeypatch.setattr(make, "carry_out", carry_out)
-    monkeypatch.setattr(engine, "try_names", lambda *_: None)
+    monkeypatch.setattr(make, "study", lambda plan, *_: plan)
+    monkeypatch.setattr(engine, "carry_out", carry_out)
+    monkeypatch.setattr(engine, "refuse", lambda *_: None)
     monkeypatch.setattr(verb, "tell", lambda *_: None)
     line = (
         "--slam shunting,oracle(ekf,moving) ekf my_pkg:MySlam --oracle shunting karto,moving "
