@@ -43,7 +43,7 @@ def drawn(
     slams = list(dict.fromkeys(named))
     found = [by_track(lost, slams, subject, f"Runs lost by track, %: {where}")]
     if ranked:
-        title = f"Runs lost by level, %: of {ranked[0]['runs']} runs"
+        title = f"Runs lost by level, %: {ranked[0]['runs']} runs"
         found.append(by_level(ranked, subject, title))
     return dict(zip(NAMES, found, strict=False))
 

@@ -123,27 +123,25 @@ def _dishonesty(run: Judged) -> float | None:
     return None if ratio is None else abs(math.log(ratio))
 
 
+_MOMENTS = {"mean_e": "mean error", "var_e": "variance of error", "var_p": "mean square error"}
+
+
 def _moments() -> list[Metric]:
     """The paper's mean(e), var(e) and var(p) of x, y and heading."""
 
     def row(which: str, k: int, axis: str, unit: str) -> Metric:
-        kind, _, of = which.partition("_")
-        mean = kind == "mean"
+        mean = which == "mean_e"
         form = ("{:+.5f}" if unit == "rad" else "{:+.4f}") if mean else "{:.2e}"
         return Metric(
             key=f"{which}_{axis}_{unit}" + ("" if mean else "2"),
             unit=unit if mean else unit + "²",
             compute=lambda run: float(getattr(run.statistics, "mean" if mean else which)[k]),
-            label=f"{kind}({of}) {axis}", section="errors", summary=None,
+            label=f"{_MOMENTS[which]}, {axis}", section="errors", summary=None,
             least=-math.inf if mean else 0.0,
             in_run=f"{which}_{axis}", form=form,
         )  # fmt: skip
 
-    return [
-        row(which, k, axis, unit)
-        for which in ("mean_e", "var_e", "var_p")
-        for k, (axis, unit) in enumerate(AXES)
-    ]
+    return [row(which, k, axis, unit) for which in _MOMENTS for k, (axis, unit) in enumerate(AXES)]
 
 
 def _count(key: str, section: Section, unit: str = "") -> Metric:
