@@ -10,7 +10,7 @@ import os
 import socket
 import struct
 from contextlib import suppress
-from functools import cache
+from functools import cache, partial
 from threading import Thread
 from typing import Any
 from weakref import WeakValueDictionary, finalize
@@ -65,19 +65,20 @@ def open_link(number: int, namespace: str, _router: int) -> "DdsLink":
         inbox = socket.socket(socket.AF_INET, socket.SOCK_DGRAM)
         inbox.bind(("127.0.0.1", 0))
         domain = _domains[number] = Domain(number, _ALONE.format(inbox.getsockname()[1]))
-        Thread(target=_repeat, args=(inbox, 7400 + 250 * number), daemon=True).start()
-        finalize(domain, inbox.sendto, b"", inbox.getsockname())
+        end = os.urandom(16)  # which no other process can say
+        Thread(target=_repeat, args=(inbox, 7400 + 250 * number, end), daemon=True).start()
+        finalize(domain, inbox.sendto, end, inbox.getsockname())
     return DdsLink(number, namespace, domain)
 
 
-def _repeat(inbox: socket.socket, port: int) -> None:
-    """Send what comes to all who listen to others at ``port`` on this machine, until b"" comes.
+def _repeat(inbox: socket.socket, port: int, end: bytes) -> None:
+    """Send what comes to all who listen to others at ``port`` on this machine, until ``end`` comes.
 
     It goes by every interface, with as many hops to live as keep it here: none.
     """
     with inbox, socket.socket(socket.AF_INET, socket.SOCK_DGRAM) as outbox:
         outbox.setsockopt(socket.IPPROTO_IP, socket.IP_MULTICAST_TTL, 0)
-        while packet := inbox.recv(1 << 16):
+        for packet in iter(partial(inbox.recv, 1 << 16), end):
             for index, _ in socket.if_nameindex():
                 by = struct.pack("8xi", index)  # ip_mreqn
                 with suppress(OSError):  # one that is down
