@@ -21,7 +21,7 @@ if TYPE_CHECKING:
     from scripts.pages.page import Part
 
 
-UNFAIR = "* does not count: no oracle holds there"
+UNFAIR = "* does not count: when it was published no oracle held there"
 SAID = 2  # sentences over the pictures: the answer and the place; the rest is by the last table
 MOST_COLUMNS = 5  # SLAMs in the table of the terminal; the page has all
 
