@@ -1,10 +1,15 @@
 # SPDX-License-Identifier: Apache-2.0
-"""Nodes of other makes, built or found."""
+"""Nodes of other makes, built or found, and one network for all of them."""
 
+import fcntl
+import os
 import shutil
 import subprocess
 import sys
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+from tempfile import gettempdir
 
 import pytest
 
@@ -30,10 +35,25 @@ def node(tmp_path_factory) -> Path:
     return folder / "node"
 
 
+@contextmanager
+def network(how: int) -> Iterator[None]:
+    """Until its end, no test adds an interface (LOCK_SH), or none has a client (LOCK_EX).
+
+    A participant states the addresses of all interfaces that are there when it starts: one that
+    goes again is where its scans are sent.
+    """
+    with (Path(gettempdir()) / f"mobilia-network-{os.getuid()}").open("a") as held:
+        fcntl.flock(held, how)
+        yield
+
+
 @pytest.fixture(params=MIDDLEWARES)
-def client(request) -> tuple[str, list[object]]:
+def client(request) -> Iterator[tuple[str, list[object]]]:
     """A middleware and the words that start a client of another make on it."""
     if request.param == "dds":
-        return "dds", [request.getfixturevalue("node")]
-    pytest.importorskip("zenoh_ros2_sdk", reason="needs zenoh-ros2-sdk")
-    return "zenoh", [sys.executable, HERE / "zenoh_client.py"]
+        words = [request.getfixturevalue("node")]
+    else:
+        pytest.importorskip("zenoh_ros2_sdk", reason="needs zenoh-ros2-sdk")
+        words = [sys.executable, HERE / "zenoh_client.py"]
+    with network(fcntl.LOCK_EX if "cable" in request.fixturenames else fcntl.LOCK_SH):
+        yield request.param, words

@@ -8,8 +8,9 @@ import subprocess
 import sys
 import time
 from collections.abc import Callable, Iterator
-from contextlib import closing
+from contextlib import closing, nullcontext
 from dataclasses import replace
+from fcntl import LOCK_EX
 from itertools import count
 
 import numpy as np
@@ -26,6 +27,7 @@ from slam.ros.robot import Robot
 from slam.ros.template import said_ns
 from slam.system import create
 from tests.slam.ros.clients import PREFIXES, on, started
+from tests.slam.ros.conftest import network
 from tests.slam.ros.frames import driven
 
 CABLES = count()
@@ -94,7 +96,14 @@ def test_of_many_that_speak_only_the_first_that_makes_sense_is_believed(client, 
 
 
 @pytest.fixture
-def cable() -> Iterator[tuple[list[str], str, str, Callable[[str], None]]]:
+def alone(request) -> Iterator[None]:
+    """No client of another test; ``client`` sees to it where there is one of this."""
+    with network(LOCK_EX) if "client" not in request.fixturenames else nullcontext():
+        yield
+
+
+@pytest.fixture
+def cable(alone) -> Iterator[tuple[list[str], str, str, Callable[[str], None]]]:
     """Another machine: words that start a program on it, our address, its address, and a switch."""
     pid, one = os.getpid(), next(CABLES)  # the last one may still be going
     space, ours, theirs = f"mobilia{pid}-{one}", f"mob{pid}{one}a", f"mob{pid}{one}b"
@@ -121,6 +130,7 @@ def cable() -> Iterator[tuple[list[str], str, str, Callable[[str], None]]]:
         there,
         lambda how: subprocess.run(["ip", "link", "set", ours, how], check=True),
     )
+    subprocess.run(["ip", "link", "del", ours], check=True)  # at once; with the space it is later
     subprocess.run(["ip", "netns", "del", space], check=True)
 
 
