@@ -5,14 +5,14 @@ A reader's SLAM gets a row between the others on the same recordings, without ru
 
     python -m scripts.benchmark.published out/top --levels 1 --seeds 10 --run shunting karto
     python -m scripts.benchmark.published out/low out/top --commit HASH   # writes published.json
+    python -m scripts.benchmark.published scripts/benchmark/published.json out/more --commit HASH
 
-The first goes on where it was stopped. All rows of the file are of one commit.
+The first goes on where it was stopped. The last adds to a file of that commit: all rows are of one.
 """
 
 import argparse
 import sys
 from collections.abc import Iterator, Sequence
-from itertools import product
 from pathlib import Path
 from typing import Any
 
@@ -39,38 +39,52 @@ def digests(plan: Plan, folder: Path) -> dict[At, str]:
 def write_from(folders: Sequence[Path], path: Path, commit: str) -> Results:
     """Of folders of ``mobilia benchmark`` or ``--run``, all tracks that are whole in them.
 
-    commit  of the code that made their rows
+    folders  or files of this kind
+    commit   of the code that made their rows
 
-    Raises ``InvalidValueError`` for what is no commit, for folders without a track and for two
-    whose recordings differ.
+    Raises ``InvalidValueError`` for what is no commit, for folders without a track, a file of
+    another commit and for two whose recordings differ.
     """
     shaped("--commit", commit, Commit)
     runs: dict[str, Made] = {}
-    for folder, track in product(folders, TRACKS.values()):
-        if not (folder / track.name / "recipe.json").exists():
-            continue
-        there = runs.setdefault(track.name, {})
-        for at, scans, rows in _made(folder / track.name, track):
+    for folder in folders:
+        for name, at, scans, rows in _made(folder, commit):
+            there = runs.setdefault(name, {})
             known, others = there.get(at, (scans, {}))
             if known != scans:
-                key = f"{track.name} {at[0]:g} {at[1]}"
+                key = f"{name} {at[0]:g} {at[1]}"
                 raise InvalidValueError(f"{folder}: {key}: other scans than in another folder")
             there[at] = (scans, {**others, **rows})
     if not runs:
         raise InvalidValueError(f"no track in {', '.join(map(str, folders))}")
+    runs = {name: dict(sorted(runs[name].items())) for name in TRACKS if name in runs}
     made_with = {"commit": commit, "versions": versions(), "machine": machine()}
     write(path, Results(runs=runs, made_with=made_with))
     return read(path)
 
 
-def _made(folder: Path, track: Track) -> Iterator[tuple[At, str, dict[str, Row]]]:
-    """Of each level and seed of a comparison: the digest of its scans, and a row of each SLAM."""
+def _made(folder: Path, commit: str) -> Iterator[tuple[str, At, str, dict[str, Row]]]:
+    """Of each track, level and seed: the digest of its scans, and a row of each SLAM."""
+    if not folder.is_file():
+        for track in TRACKS.values():
+            if (folder / track.name / "recipe.json").exists():
+                yield from _compared(folder / track.name, track)
+        return
+    known = read(folder)
+    if known.made_with.get("commit") != commit:
+        raise InvalidValueError(f"{folder}: of commit {known.made_with.get('commit')}")
+    for name, made in known.runs.items():
+        yield from ((name, at, *both) for at, both in made.items())
+
+
+def _compared(folder: Path, track: Track) -> Iterator[tuple[str, At, str, dict[str, Row]]]:
     done = compared(folder)
     asked = done.settings
     plan = track.plan(asked["slams"], tuple(asked["seeds"]), levels=tuple(asked["levels"]))
     for at, scans in digests(plan, folder).items():
         rows = (row for row in done.runs if (row["dynamism"], row["seed"]) == at)
-        yield at, scans, {row["slam"]: {k: _short(row.get(k)) for k in COLUMNS} for row in rows}
+        cells = {row["slam"]: {k: _short(row.get(k)) for k in COLUMNS} for row in rows}
+        yield track.name, at, scans, cells
 
 
 def _short(value: Any) -> Any:

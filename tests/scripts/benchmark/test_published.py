@@ -156,6 +156,13 @@ def test_the_file_is_of_the_folders_alone_and_of_one_commit(tmp_path, monkeypatc
         (slam, seed, commit, 2.0) for slam in ("shunting", "odometry") for _, seed in again
     }  # fmt: skip
     assert publish.top_table(made).endswith("| track |\n| --- |\n| moving-boards-v2 |")  # too few
+    again = {(0.5, 906): again[1.0, 906]}  # what is run later is added to it
+    rows = [{**rows[0], "slam": "karto", "dynamism": 0.5}]
+    asked["seeds"], asked["levels"] = track.test[:1], [0.5]
+    both = published.write_from([path, tmp_path], path, commit).runs[TRACK]
+    assert [*both] == [(0.5, 906), *made.runs[TRACK]]
+    with pytest.raises(InvalidValueError, match=f"of commit {commit}"):
+        published.write_from([path], path, "0123456")
     with pytest.raises(InvalidValueError, match="commit must be the hash"):
         published.write_from([], path, "0c42a0f (oracle(map): 02c3eff)")
     with pytest.raises(InvalidValueError, match="no track in"):
