@@ -98,8 +98,8 @@ def test_a_guest_has_numbers_by_its_own_names(name: str, number: str, stream: li
     for track in tracks:
         assert track.survive(stream[:12]) is None
     assert not np.allclose(*(track.online().poses for track in tracks), atol=1e-6)
-    with pytest.raises(UnknownNameError, match="Config has no 'siz'"):
-        create(f"{name}{{siz=1}}")
+    with pytest.raises(UnknownNameError, match="Config has no 'nothing'"):
+        create(f"{name}{{nothing=1}}")
 
 
 def test_kartos_grid_keeps_its_odd_side(stream: list[Frame], capfd: pytest.CaptureFixture) -> None:
