@@ -20,6 +20,7 @@ from scripts.figures import INK, MUTED, color_of, save, styled
 from scripts.jobs import try_names
 from scripts.machine import machine
 from scripts.output import plain, result_folder
+from scripts.report.answer import ODOMETRY
 from scripts.tuning.search import JUDGED, Search, Task, Trial
 from scripts.tuning.space import defaults
 from scripts.tuning.verdict import Verdict, judge
@@ -50,12 +51,10 @@ class Tuned:
         if self.verdict is None:
             none = "fitted into the time" if n == 0 else "was better on the training seeds"
             return [f"No gain: no trial {none}.", *([searched] if n else [])]
-        before, after = self.verdict.ms
-        return [
-            self.verdict.sentence,
-            searched,
-            f"A scan takes {after:.1f} ms, before {before:.1f}.",
-        ]
+        (before, after), alone = self.verdict.ms, self.verdict.odometry_lost
+        control = f"Odometry alone is lost in {alone} of {self.verdict.runs}."
+        cost = f"A scan takes {after:.1f} ms, before {before:.1f}."
+        return [self.verdict.sentence, searched, control, cost]
 
 
 def carry_out(task: Task, out: Path, *, jobs: int = 1) -> Tuned:
@@ -71,7 +70,7 @@ def carry_out(task: Task, out: Path, *, jobs: int = 1) -> Tuned:
         search.go_on()
         best, verdict = search.best, None
         if best.name != task.slam:
-            plan = task.plan((task.slam, best.name), task.track.test)
+            plan = task.plan((task.slam, best.name, ODOMETRY), task.track.test)
             rows = comparison.carry_out(plan, out / JUDGED, jobs=jobs)
             verdict = judge(rows, task.slam, best.name)
         found = list(search.trials.values())
@@ -100,7 +99,7 @@ def _write(folder: Path, tuned: Tuned) -> None:
 
 def numbers_table(tuned: Tuned) -> Table:
     """What each number was, what was found, and where it was searched."""
-    table = plain_table("Numbers to set")
+    table = plain_table("")
     for head in ("number", "before", "found", "searched"):
         table.add_column(head, justify="left" if head == "number" else "right", overflow="fold")
     before = defaults(tuned.task.slam, tuned.task.space)

@@ -34,7 +34,7 @@ from slam.shaped import within
 SEED = 1  # of the sampler
 SIDE_BY_SIDE = 5  # runs of a trial before it is asked whether it can still win, whatever --jobs is
 MOST_AGAIN = 100  # proposals in a row that were tried before: the space has no others
-RESERVE = 1.5  # times the time that judging is expected to take
+RESERVE = 2.0  # times the time that judging is expected to take
 RUNS, JUDGED = "search", "judged"  # folders: of the search, of a comparison on fresh seeds
 SPENT = "spent.json"  # s of earlier calls, by task
 

@@ -6,6 +6,7 @@ from dataclasses import dataclass
 from typing import Literal
 
 from scripts.comparison.tables import Row, by_seed
+from scripts.report.answer import ODOMETRY
 from slam.evaluation.statistics import paired, quantile, ratio_interval, share_interval
 
 LEVEL = 0.025  # of the sign tests: two questions are asked, and both together err in 1 of 20
@@ -20,7 +21,7 @@ class Verdict:
     lost   runs lost by each, of ``runs``;  saved, anew  runs that only the first, the second lost
     held   runs that both held;  error_m  medians in them;  wins  of the second there
     ratio  of the errors, with its interval;  p_lost, p_error  of the sign tests
-    ms     of a scan, medians
+    ms     of a scan, medians;  odometry_lost  runs that it loses alone, if it ran
     """
 
     gain: Literal["lost", "error", ""]
@@ -35,6 +36,7 @@ class Verdict:
     wins: int
     p_error: float
     ms: tuple[float, float]
+    odometry_lost: int
 
     @property
     def sentence(self) -> str:
@@ -57,7 +59,8 @@ class Verdict:
             return f"{lost[0].upper()}{lost[1:]}."
         if self.gain == "error":
             return f"{error[0].upper()}{error[1:]}; {lost}."
-        return f"No gain that fresh seeds confirm: {lost}" + (f"; {error}." if self.held else ".")
+        tells = 2.0 * 0.5**self.held < LEVEL  # else not even all wins would
+        return f"No gain that fresh seeds confirm: {lost}" + (f"; {error}." if tells else ".")
 
 
 def judge(rows: Sequence[Row], before: str, after: str) -> Verdict:
@@ -83,4 +86,5 @@ def judge(rows: Sequence[Row], before: str, after: str) -> Verdict:
         anew=of_lost["losses"], p_lost=of_lost["p_sign"], held=len(held),
         error_m=(medians[0], medians[1]), ratio=(ratio, *ratio_interval(*errors)),
         wins=of_error["wins"], p_error=of_error["p_sign"], ms=(ms[0], ms[1]),
+        odometry_lost=int(sum(by_seed(rows, ODOMETRY, "lost").values())),
     )  # fmt: skip

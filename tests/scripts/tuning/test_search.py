@@ -23,6 +23,7 @@ from slam.errors import OutputError
 from slam.estimate import Estimate
 from slam.odometry import OdometrySlam
 from slam.settings import Settings, number
+from tests.commands import of_page, read_by
 
 pytest.importorskip("optuna")
 pytestmark = pytest.mark.slow
@@ -138,14 +139,16 @@ def test_the_score_falls_from_failed_over_lost_to_held(tmp_path: Path, out: Path
     assert score("off{off_m=0.2}") == pytest.approx(0.2, abs=0.05)
 
 
-def test_the_verb_says_it_and_leaves_a_page(out: Path):
+def test_the_verb_says_it_and_leaves_a_page(out: Path, monkeypatch: pytest.MonkeyPatch):
     space = out / "off.toml"
     words = f"tune off --space {space} --track tiny --seeds 3 --trials 8 --out {out / 'tune'}"
     done = CliRunner().invoke(app, words.split())
     assert done.exit_code == 0, done.output
     assert "Lost in 0 (95 %: 0 to 35 %) of 7 fresh runs instead of 7" in done.output
-    page = (out / "tune" / "index.html").read_text()
-    assert "mobilia benchmark --slam" in page
+    lines, read = of_page(out / "tune" / "index.html"), read_by(monkeypatch)
+    assert [line.split()[1] for line in lines] == ["report", "benchmark"]
+    for line in lines:
+        read(line)
     assert (out / "tune" / "judged" / "paired.csv").exists()
 
 

@@ -49,7 +49,9 @@ def test_nothing_held_and_failed_runs_are_judged_too():
               for k in range(8)]  # fmt: skip
     found = judge(failed + rows("b", [HELD] * 8), "a", "b")
     assert (found.gain, found.held) == ("lost", 0)
-    assert verdict([LOST] * 8, [LOST] * 8).sentence.endswith("(p = 1).")
+    few = [*[LOST] * 8, *[HELD] * 6]
+    assert verdict(few, few).sentence.endswith("0 saved, 0 lost anew (p = 1).")
+    assert "where both hold" in verdict([*few, HELD], [*few, HELD]).sentence
 
 
 def test_equals_are_called_a_gain_in_one_of_twenty_at_most():
