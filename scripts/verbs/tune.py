@@ -32,8 +32,8 @@ class Tune:
         complete=SLAMS,
     )
     space: Path = option(
-        "TOML file: under [numbers], PATH = {low = 1, high = 20}, also log = true or int = true; "
-        "or PATH = {choices = [1, 2]}.",
+        "TOML file, whose table numbers has PATH = {low = 1, high = 20}, also log = true or "
+        "int = true; or choices = ... in place of low and high.",
         REQUIRED,
     )
     track: str = option(
