@@ -91,8 +91,11 @@ def fact(sentence: str, *, bad: bool = False) -> None:
     console.print(plain(sentence), style=style, highlight=False, soft_wrap=True)
 
 
-def progress() -> Progress:
-    """A progress bar with time left; a line every ``LINE_EVERY_S`` where nobody can see a bar."""
+def progress(*, quiet: bool = False) -> Progress:
+    """A progress bar with time left; a line every ``LINE_EVERY_S`` where nobody can see a bar.
+
+    quiet  nothing is shown: it is a step of what has a bar already
+    """
     kind = Progress if console.is_interactive else Lines
     return kind(
         SpinnerColumn(),
@@ -103,6 +106,7 @@ def progress() -> Progress:
         _Left(),
         console=console,
         transient=False,
+        disable=quiet,
     )
 
 
@@ -112,12 +116,14 @@ class Lines(Progress):
     def start(self) -> None:
         """Begin to tell, from a thread of its own: a long step does not call anything."""
         self._ticks = ExitStack()
-        self._ticks.enter_context(_ticking(self._tell))
+        if not self.disable:
+            self._ticks.enter_context(_ticking(self._tell))
 
     def stop(self) -> None:
         """Tell once more, how it ended."""
         self._ticks.close()
-        self._tell()
+        if not self.disable:
+            self._tell()
 
     def _tell(self) -> None:
         for task in self.tasks:

@@ -65,7 +65,8 @@ class Job:
 
     def work(self) -> Work:
         """Its kind: the function, and of which SLAM or scene."""
-        of = self.arguments.get("slam") or self.arguments.get("scene") or ""
+        slam = self.arguments.get("slam")
+        of = parsed(slam)[0] if slam else self.arguments.get("scene") or ""
         return Work(f"{self.call.__module__}.{self.call.__qualname__} {of}", self.seconds)
 
     def file_name(self) -> str:
@@ -78,6 +79,7 @@ class Job:
 
 
 _versions = cache(versions)
+_GUESTS = "slam.guests."  # modules of what is not ours
 
 
 @cache
@@ -109,7 +111,9 @@ def try_names(slams: Iterable[str], scenes: Iterable[str]) -> None:
         if name not in registry.OWN:
             registry.build(name)
     for name in slams:
-        if parsed(name)[0] not in system.OWN or system.config_of(name) is None:
+        base = parsed(name)[0]
+        guest = system.OWN.get(base, _GUESTS).startswith(_GUESTS)
+        if system.config_of(name) is None or guest:
             limited(name, Limits())
 
 
@@ -122,7 +126,7 @@ def run_jobs(
     title: str = "jobs",
 ) -> dict[str, Path]:
     """Make what is missing, on ``processes`` processes or on a Dask ``cluster`` that sees
-    ``folder``; the file of each job by its name.
+    ``folder``; the file of each job by its name. Without a ``title`` nothing is shown.
 
     A job that fails stops the rest and is named in the error; results that are whole stay, and the
     next call goes on from them. One that is not what its hash says is named and made again. Raises
@@ -151,7 +155,7 @@ def _make_missing(
 ) -> dict[str, Path]:
     files = {name: folder / job.file_name() for name, job in wanted.items()}
     missing = [job for name, job in wanted.items() if not _whole(files[name])]
-    with progress() as bar:
+    with progress(quiet=not title) as bar:
         total, there = len(wanted), len(wanted) - len(missing)
         task = bar.add_task(escape(title), total=total, completed=there, before=there, unit="")
         pairs = [(job, files[job.name]) for job in missing]

@@ -1,6 +1,7 @@
 # SPDX-License-Identifier: Apache-2.0
 """Names that are typed, and names of outputs: all that a verb needs before its slow imports."""
 
+import hashlib
 from collections.abc import Sequence
 from pathlib import Path
 
@@ -9,6 +10,7 @@ from scripts.console import note
 from slam import system
 from slam.variants import inside
 
+MOST_LETTERS = 120  # of a system's name in that of a file: disks take 255 in all
 RUNS = "runs"  # of a comparison: the folder of its runs
 DATASET = "dataset.json"  # the plan that ``generate`` writes (``sim.recording.dataset``)
 # Endings of logs, which are no part of their names.
@@ -56,4 +58,7 @@ def scene_name(scene: str) -> str:
 
 def file_name(name: str) -> str:
     """A system's name as part of a file name: ``my_pkg:MySlam`` becomes ``my_pkg-MySlam``."""
-    return "".join(c if c.isalnum() or c in "-_." else "-" for c in name).lstrip("-.")
+    short = name if len(name) <= MOST_LETTERS else (
+        f"{name[:MOST_LETTERS]}-{hashlib.sha256(name.encode()).hexdigest()[:10]}"
+    )  # fmt: skip
+    return "".join(c if c.isalnum() or c in "-_." else "-" for c in short).lstrip("-.")

@@ -28,6 +28,7 @@ _ALWAYS = {
     "compare": (*_TABLES, "paired.csv"),
     "drive": (*_TABLES, "goals.csv", "closed_loop.png", "paths.png"),
     "blame": ("blame.json", "blame.png"),
+    "tune": ("trials.csv", "trials.png", "tune.json"),
     "days": ("days.csv", "days.json"),
     "benchmark": ("leaderboard.json", "leaderboard.csv", "leaderboard.md"),
 }
@@ -68,7 +69,7 @@ def _way(folder: Path) -> Callable[[Path], list[Finding]] | None:
 
 
 def _check_result(folder: Path) -> list[Finding]:
-    """A folder of ``run``, ``demo``, ``compare``, ``drive`` or ``blame``, and those within it."""
+    """A folder of ``run``, ``demo``, ``compare``, ``drive``, ``blame`` or ``tune``, and in it."""
     listed, found = listed_in(folder)
     if listed:
         found = faults(folder, listed)

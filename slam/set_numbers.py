@@ -43,7 +43,7 @@ def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
             if path in changes[name]:
                 raise InvalidValueError(f"--set: '{path}' is set twice")
             changes[name][path] = value
-    variants = tuple(_with(name, changes[name]) for name in names)
+    variants = tuple(with_numbers(name, changes[name]) for name in names)
     for name, variant in zip(names, variants, strict=True):
         if changes[name] and ":" not in parsed(name)[0]:
             try:
@@ -54,10 +54,11 @@ def with_set(names: Sequence[str], words: Sequence[str]) -> tuple[str, ...]:
     return variants
 
 
-def _with(name: str, more: Mapping[str, Any]) -> str:
+def with_numbers(name: str, more: Mapping[str, Any]) -> str:
+    """The name of a SLAM, or of an oracle of one, with these numbers beside its own."""
     if not more:
         return name
     if (found := oracle_of(name)) is not None:
-        return oracle_named(f"{_with(found[0], more)},{found[1]}")
+        return oracle_named(f"{with_numbers(found[0], more)},{found[1]}")
     base, own = parsed(name)
     return named(base, {**own, **more})

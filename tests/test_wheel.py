@@ -113,9 +113,12 @@ def pins(name: str) -> set[str]:
 
 def test_the_lock_of_what_ci_adds_has_the_extra_at_the_versions_of_the_lock():
     project = tomllib.loads((REPO / "pyproject.toml").read_text())
-    extra, ci = project["project"]["optional-dependencies"]["ros2"], pins("requirements-ci.lock")
-    assert {*extra} < {*project["dependency-groups"]["ci"]}
-    assert {"cyclonedds", "eclipse-zenoh", "uv"} <= {re.split(r"[=\[ ]", pin)[0] for pin in ci}
+    extras, ci = project["project"]["optional-dependencies"], pins("requirements-ci.lock")
+    for extra in ("ros2", "data", "tune"):
+        assert {*extras[extra]} < {*project["dependency-groups"]["ci"]}
+    assert {"cyclonedds", "eclipse-zenoh", "optuna", "uv"} <= {
+        re.split(r"[=\[ ]", pin)[0] for pin in ci
+    }
     known = pins("requirements.lock")
     names = {re.split(r"[=\[ ]", pin)[0] for pin in known}
     assert {pin for pin in ci if re.split(r"[=\[ ]", pin)[0] in names} <= known

@@ -28,6 +28,7 @@ EXTRAS = {  # what each is for; how to get them follows from their names
     "yag": "YAG SLAM",
     "rl": "training policies (sim.gym.learning)",
     "data": "Parquet and Minari (export, generate)",
+    "tune": "numbers of a SLAM searched",
     "ros2": "nodes of ROS 2 over DDS and Zenoh",
     "cluster": "--cluster",
 }

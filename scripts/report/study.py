@@ -191,7 +191,9 @@ MAKE = "mobilia compare --slam A B --out DIR makes a folder for it"
 # What other commands left, and what to do with it instead.
 _OTHERS = {
     **dict.fromkeys(("run", "demo"), f"a report is about a comparison, {MAKE}"),
-    **dict.fromkeys(("benchmark", "lifelong", "blame", "drive"), "index.html there is its page"),
+    **dict.fromkeys(
+        ("benchmark", "lifelong", "blame", "drive", "tune"), "index.html there is its page"
+    ),
     "days": "days.csv has its scores",
 }
 _DATASET = (

@@ -11,15 +11,17 @@ in no fixed order: two runs agree to about 1e-14 m a scan, not to the bit.
 import ctypes
 import os
 import sys
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping
 from contextlib import contextmanager
-from typing import Any
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, flattened, lifted, needed, stacked, voxel_m
+from slam.guests.guest import Guest, configured, flattened, lifted, needed, stacked, voxel_m
+from slam.settings import Settings, number
 
 
 @contextmanager
@@ -50,28 +52,61 @@ def quiet() -> Iterator[None]:
 
 KEPT_SHARE = 0.5  # of a voxel: edge of the cells of which map and match take one point each; at
 # 1.0 the layers fall together now and then, and the match diverges in small rooms
-POINTS = 1  # in a voxel of its map; its default
-PLANARITY = 0.2  # least eigenvalue by their sum, up to which a patch is a plane; its default
-MAP_M = 100.0  # structure farther from the robot is dropped from its map
-FIRST_M = 0.15  # m, correspondence threshold at first; training seeds
-STILL_M = 0.02  # m; motion below it is not learnt; training seeds
-ITERATIONS = 100  # its default
-CONVERGED = 1e-3  # m and rad, of a step; 1e-4 takes twice as long and is no better
+OF_PACKAGE, TRAINED = "its package", "training seeds"
+
+
+@dataclass(frozen=True, kw_only=True)
+class GenzIcpConfig(Settings):
+    """Numbers of GenZ-ICP, by the names of its YAML."""
+
+    max_range: float = number(
+        100.0, "m", "structure farther from the robot is dropped from its map", OF_PACKAGE,
+        low=0.5, high=1000.0,
+    )  # fmt: skip
+    max_points_per_voxel: int = number(
+        1, "points", "in a voxel of its map", OF_PACKAGE, low=1, high=1000
+    )
+    planarity_threshold: float = number(
+        0.2, "share", "least eigenvalue by their sum, up to which a patch is a plane", OF_PACKAGE,
+        low=1e-6, high=1.0,
+    )  # fmt: skip
+    initial_threshold: float = number(
+        0.15, "m", "correspondence threshold at the start", TRAINED, low=0.01, high=10.0
+    )
+    min_motion_th: float = number(
+        0.02, "m", "motion below it is not learnt", TRAINED, low=1e-4, high=10.0
+    )
+    max_num_iterations: int = number(100, "steps", "of a match", OF_PACKAGE, low=1, high=5000)
+    convergence_criterion: float = number(
+        1e-3, "m, rad", "a smaller step ends a match; 1e-4 takes twice as long and is no better",
+        low=1e-9, high=0.1,
+    )  # fmt: skip
 
 
 class GenzIcpSlam(Guest):
     """GenZ-ICP, a guest: ICP that weighs planes and points, with odometry as its guess."""
 
-    def __init__(self) -> None:
+    config_class: ClassVar[type[GenzIcpConfig]] = GenzIcpConfig
+
+    def __init__(self, config: GenzIcpConfig | Mapping[str, Any] | None = None) -> None:
+        self.config = configured(GenzIcpConfig, config)
         self._genz: Any = needed("genz_icp.pybind.genz_icp_pybind", "genz-icp")
         super().__init__()
 
     def begin(self, spec: LaserSpec) -> None:
         """A matcher with a map of this scanner's grain."""
         self._voxel_m = voxel_m(spec.angle_increment)
-        self._map: Any = self._genz._VoxelHashMap(self._voxel_m, MAP_M, MAP_M, PLANARITY, POINTS)
-        self._matcher: Any = self._genz._Registration(ITERATIONS, CONVERGED, 1)
-        self._threshold: Any = self._genz._AdaptiveThreshold(FIRST_M, STILL_M, MAP_M)
+        own = self.config
+        self._map: Any = self._genz._VoxelHashMap(
+            self._voxel_m, own.max_range, own.max_range, own.planarity_threshold,
+            own.max_points_per_voxel,
+        )  # fmt: skip
+        self._matcher: Any = self._genz._Registration(
+            own.max_num_iterations, own.convergence_criterion, 1
+        )
+        self._threshold: Any = self._genz._AdaptiveThreshold(
+            own.initial_threshold, own.min_motion_th, own.max_range
+        )
 
     def locate(self, points_robot: Float, prediction: Prediction) -> tuple[Float, dict[str, float]]:
         """Its registration from the predicted pose, as its own odometry calls it."""

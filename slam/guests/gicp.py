@@ -6,26 +6,56 @@ stay where they were matched, and each scan is matched to those kept nearest to 
 It is made for 3D scanners: scans are stacked in three layers, and the pose found is laid flat.
 """
 
-from typing import Any
+from collections.abc import Mapping
+from dataclasses import dataclass
+from typing import Any, ClassVar
 
 import numpy as np
 
 from slam import se2
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, flattened, lifted, moved_on, nearest, needed, stacked
+from slam.guests.guest import (
+    KEEP_M,
+    Guest,
+    configured,
+    flattened,
+    lifted,
+    moved_on,
+    nearest,
+    needed,
+    stacked,
+)
+from slam.settings import Settings, number
 
-CELL_M = 0.05  # m; one point in each such cell
 APART_M = 0.1  # m between the three layers
-NEIGHBOURS = 10  # points that a covariance is of; its default for pre-processing
-REACH_M = 0.15  # points farther apart are no pair; 0.25 and 0.5 m are pulled along by movers
-ITERATIONS = 30
+
+
+@dataclass(frozen=True, kw_only=True)
+class SmallGicpConfig(Settings):
+    """Numbers of small_gicp, by its own names."""
+
+    downsampling_resolution: float = number(
+        0.05, "m", "one point in each such cell", low=0.005, high=5.0
+    )
+    num_neighbors: int = number(
+        10, "points", "that a covariance is of", "its package", low=3, high=100
+    )
+    max_correspondence_distance: float = number(
+        0.15, "m", "points farther apart are no pair; 0.25 and 0.5 are pulled along by movers",
+        "training seeds", low=0.01, high=10.0,
+    )  # fmt: skip
+    max_iterations: int = number(30, "steps", "of a match", low=1, high=1000)
+    keep_m: float = number(KEEP_M, "m", "a scan is kept after so much way", low=0.01, high=10.0)
 
 
 class SmallGicpSlam(Guest):
     """small_gicp's matcher, a guest: generalised ICP to nearby kept scans, no graph."""
 
-    def __init__(self) -> None:
+    config_class: ClassVar[type[SmallGicpConfig]] = SmallGicpConfig
+
+    def __init__(self, config: SmallGicpConfig | Mapping[str, Any] | None = None) -> None:
+        self.config = configured(SmallGicpConfig, config)
         self._gicp: Any = needed("small_gicp", "small-gicp")
         super().__init__()
 
@@ -45,11 +75,12 @@ class SmallGicpSlam(Guest):
             cloud, tree = self._goal(pose)
             source, _ = self._prepared(points_robot)
             result = self._gicp.align(
-                cloud, source, tree, lifted(pose), "GICP", REACH_M, 1, ITERATIONS
-            )
+                cloud, source, tree, lifted(pose), "GICP",
+                self.config.max_correspondence_distance, 1, self.config.max_iterations,
+            )  # fmt: skip
             pose = flattened(result.T_target_source)
             share = result.num_inliers / max(source.size(), 1)
-        if not self._kept or moved_on(self._places[-1], pose):
+        if not self._kept or moved_on(self._places[-1], pose, self.config.keep_m):
             self._kept.append(se2.transform(pose, points_robot))
             self._places.append(pose)
         return pose, {"inliers": float(share)}
@@ -63,4 +94,7 @@ class SmallGicpSlam(Guest):
         return self._target
 
     def _prepared(self, points: Float) -> Any:
-        return self._gicp.preprocess_points(stacked(points, APART_M), CELL_M, NEIGHBOURS, 1)
+        own = self.config
+        return self._gicp.preprocess_points(
+            stacked(points, APART_M), own.downsampling_resolution, own.num_neighbors, 1
+        )

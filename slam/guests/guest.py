@@ -6,8 +6,10 @@ matchers of others take it: in space, as ranges, against which kept scans.
 import importlib
 import math
 from abc import ABC, abstractmethod
+from collections.abc import Mapping
 from dataclasses import dataclass
 from types import ModuleType
+from typing import Any, TypeVar
 
 import numpy as np
 
@@ -19,7 +21,9 @@ from slam.frontend.config import FRONTEND, FrontendConfig
 from slam.frontend.observations import from_scan
 from slam.frontend.odometry_prior import Prediction, predict
 from slam.path import OnPath, PosePath
+from slam.settings import Settings
 
+S = TypeVar("S", bound=Settings)
 SPACING_AT_M = 10.0  # m; there a voxel is as wide as two beams are apart
 LEAST_VOXEL_M = 0.10  # m
 MOST_VOXEL_M = 0.30  # m
@@ -120,6 +124,14 @@ def needed(module: str, package: str, extra: str = "guests") -> ModuleType:
         raise MissingDependencyError(
             f"'{package}' cannot be imported ({error}): pip install 'mobilia[{extra}]'"
         ) from error
+
+
+def configured(kind: type[S], given: S | Mapping[str, Any] | None) -> S:
+    """A guest's config: itself, or the default with numbers changed by path.
+
+    Raises as ``Settings.changed``.
+    """
+    return given if isinstance(given, kind) else kind().changed(given or {})  # type: ignore[arg-type]
 
 
 class Guest(OnPath, ABC):

@@ -29,6 +29,7 @@ print("loaded:", *sorted({name.partition(".")[0] for name in sys.modules}))
         ("list", "random-rooms"),
         ("--help", "sensor-card"),
         ("blame --help", "--horizon"),
+        ("tune --help", "--space"),
         ("rnu", "Did you mean 'run'"),
         ("run --sene arena", "No such option: --sene"),
         ("run shuntin --scene arena", "Did you mean 'shunting'"),

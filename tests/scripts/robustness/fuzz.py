@@ -38,6 +38,7 @@ from scripts.comparison.tables import read_csv
 from scripts.output import read_recipe_words
 from scripts.scene.check import problems
 from scripts.scene.make import of_file
+from scripts.tuning.space import read as read_space
 from sim.core import state
 from sim.recording.dataset import read_plan
 from sim.recording.recipe import read_recipe
@@ -93,6 +94,7 @@ READERS: dict[str, Callable[[Path], Any]] = {
     "named": lambda at: scene(at / "lab.toml"),
     "events": lambda at: read_events(at / "events.toml"),
     "robot": lambda at: read_robot(str(at / "robot.toml")),
+    "space": lambda at: read_space(at / "space.toml", "shunting"),
     **dict.fromkeys(
         ("map", "png", "bmp", "tif"),
         lambda at: plan(of_file(at / "map.yaml"), source="map.yaml"),

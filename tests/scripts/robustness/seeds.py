@@ -52,6 +52,10 @@ at_s = 1
 enter = 1
 by = [2, 2]
 """
+SPACE = (
+    "[numbers]\nmatching.local.points = {low = 60, high = 360, int = true}\n"
+    'objective = {choices = ["sum", "log"]}\n"matching.reward" = {low = 1, high = 9, log = true}\n'
+)
 ROBOT = (Path(__file__).parents[3] / "sim" / "robots" / "turtlebot3.toml").read_text()
 
 
@@ -81,6 +85,7 @@ def scenes() -> dict[str, dict[str, str | bytes]]:
         "named": {"lab.toml": named + EVENTS, "shed.xml": plan, "robot.toml": ROBOT},
         "events": {"events.toml": EVENTS},
         "robot": {"robot.toml": ROBOT},
+        "space": {"space.toml": SPACE},
     }
 
 

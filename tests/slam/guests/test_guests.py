@@ -13,7 +13,12 @@ import numpy as np
 import pytest
 
 from slam import create
-from slam.errors import InvalidValueError, MissingDependencyError, SlamFailedError
+from slam.errors import (
+    InvalidValueError,
+    MissingDependencyError,
+    SlamFailedError,
+    UnknownNameError,
+)
 from slam.evaluation import metrics
 from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.frontend.odometry_prior import Prediction
@@ -76,6 +81,32 @@ def test_a_guest_begins_anew_and_repeats_itself(name: str, stream: list[Frame]) 
     again = Track(name, system)
     assert again.survive(stream[:8]) is None
     np.testing.assert_allclose(again.online().poses, track.online().poses, atol=1e-9)
+
+
+@pytest.mark.parametrize(
+    ("name", "number"),
+    [
+        ("genz-icp", "max_num_iterations=1"),
+        ("karto", "search_size=0.02"),
+        ("kiss-icp", "voxel_size=1.0"),
+        ("small-gicp", "max_iterations=1"),
+    ],
+)
+def test_a_guest_has_numbers_by_its_own_names(name: str, number: str, stream: list[Frame]) -> None:
+    needs(name)
+    tracks = [Track(one, create(one)) for one in (name, f"{name}{{{number}}}")]
+    for track in tracks:
+        assert track.survive(stream[:12]) is None
+    assert not np.allclose(*(track.online().poses for track in tracks), atol=1e-6)
+    with pytest.raises(UnknownNameError, match="Config has no 'nothing'"):
+        create(f"{name}{{nothing=1}}")
+
+
+def test_kartos_grid_keeps_its_odd_side(stream: list[Frame], capfd: pytest.CaptureFixture) -> None:
+    needs("karto")
+    track = Track("karto", create("karto{search_size=0.36,resolution=0.011}"))
+    assert track.survive(stream[:5]) is None
+    assert "out of range" not in "".join(capfd.readouterr())
 
 
 def dark(frame: Frame) -> Frame:
