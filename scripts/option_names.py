@@ -20,7 +20,7 @@ UsageError: Any = BadParameter.__base__  # which typer does not name
 WORDS = "mobilia.words"  # of the command line, in a context
 # Whose fields are filled from options of their own name, where the options do not say otherwise.
 _FILLED = ("Recipe", "Plan", "LoopConfig", "Limits", "Rule", "Question", "Pace", "Dynamism",
-           "Seeds", "Simulation", "World", "FromMap")  # fmt: skip
+           "Seeds", "Session", "Simulation", "World", "FromMap")  # fmt: skip
 _FIELD = re.compile(rf"\b({'|'.join(_FILLED)})\.([a-z_]+)\b")
 _FIRST = re.compile(r"^([a-z_]+)(?=(?:\[\d+\]\.\w+)? must )")
 

@@ -12,7 +12,7 @@ from scripts.console import note, working
 from scripts.film.encode import Pace
 from scripts.film.footage import of_log, of_scene
 from scripts.pace import Work, announce, timed
-from scripts.single_run.log_words import mount_of, tell, tell_distrust
+from scripts.single_run.log_words import UntrustedRunError, mount_of, tell, tell_distrust
 from scripts.single_run.session import Outputs, run_session
 from scripts.whole_folder import replaceable
 from slam import inputs
@@ -67,11 +67,6 @@ def session_of(name: str, maps: Maps, stream: Stream) -> Session:
         )
     history = None if maps.map_in is None else read_history(maps.map_in)
     time_s = _time_s(maps, stream, history)
-    if history is not None and len(history) and time_s <= history.times_s[-1]:
-        raise InvalidValueError(
-            f"the session begins at {time_s:.15g} s, not after the last one of the map, at "
-            f"{history.times_s[-1]:.15g} s: say when it was, as --at 2026-05-04T09:00"
-        )
     if maps.map_in is None:
         return Session(system, time_s=time_s)
     return Session.open(maps.map_in, type(system), time_s=time_s)
@@ -89,8 +84,11 @@ def _time_s(maps: Maps, stream: Stream, history: History | None) -> float:
     return 0.0
 
 
-def kept(session: Session, maps: Maps) -> None:
-    """Write the map where ``--map-out``, else ``--map-in``, says, and tell how it went."""
+def kept(session: Session, maps: Maps) -> bool:
+    """Write the map where ``--map-out``, else ``--map-in``, says, and tell how it went.
+
+    Returns whether the start was found.
+    """
     target = maps.map_out or maps.map_in
     assert target is not None
     if maps.map_out is None:
@@ -105,6 +103,7 @@ def kept(session: Session, maps: Maps) -> None:
         note(f"found after {state.found_after_s:.1f} s; the map with this session is {written}")
     else:
         note(f"the map of this session is {written}")
+    return state.found_after_s is not None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -168,9 +167,10 @@ def on_log(
         pace=Pace.of_log(footage.duration_s, footage.stream.length or 1),
     )  # fmt: skip
     results = run_session(footage.stream, show, outputs)
-    if session is not None and maps is not None:
-        kept(session, maps)
-    tell_distrust(show.track(), footage, found, strict=log.strict)
+    if session is None or maps is None or kept(session, maps):
+        tell_distrust(show.track(), footage, found, strict=log.strict)
+    elif log.strict:  # the one cause of its doubt
+        raise UntrustedRunError("the start was not found in the map (refused by --strict)")
     return results
 
 

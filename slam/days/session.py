@@ -67,14 +67,10 @@ class Session:
     ) -> None:
         if not math.isfinite(time_s):
             raise InvalidValueError(f"Session.time_s must be finite, got {time_s}")
-        if history is not None and len(history) and time_s <= history.times_s[-1]:
-            raise InvalidValueError(
-                f"Session.time_s must be later than the map's last session, at "
-                f"{history.times_s[-1]:.15g} s, got {time_s:.15g} s"
-            )
+        self.history = history or History(cell_m=CELL_M)
+        self.history.check_later(time_s)
         self.tracker, self.time_s = tracker, float(time_s)
         tracker.hold_map()  # what a session keeps of places lies in it
-        self.history = history or History(cell_m=CELL_M)
         self._found, self._new = found, found
         self.reset()
 
