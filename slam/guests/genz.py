@@ -19,7 +19,8 @@ import numpy as np
 
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, flattened, lifted, needed, stacked, voxel_m
+from slam.guests.guest import Guest, flattened, lifted, stacked, voxel_m
+from slam.names import needed
 
 
 @contextmanager
