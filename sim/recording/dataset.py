@@ -75,7 +75,7 @@ class Plan:
             )
         names = [name for recipe in self.jobs() for name in self.folders(recipe)]
         if len(set(names)) != len(names):
-            raise InvalidValueError("Plan.dynamisms are too close: two episodes have one name")
+            raise InvalidValueError("Plan: two episodes have one name (scenes, dynamisms)")
 
     def _check_parts(self) -> None:
         object.__setattr__(self, "scenes", tuple(self.scenes))

@@ -7,6 +7,7 @@ import pytest
 
 from scenes.scene_file import files, sha256_of
 from scripts.comparison.plan import Plan
+from sim.gym import offline
 from sim.recording.recipe import Recipe, read_recipe, write_recipe
 from sim.simulation import Simulation
 from sim.world.robots import FOLDER
@@ -42,6 +43,15 @@ def test_an_edited_file_is_noticed_by_both_hashes(lab: Path, name: str) -> None:
         LogFormatError, match=f"then {recipe.scene_sha256}, now {sha256_of(str(lab))}"
     ):
         Simulation(**again.simulation())
+
+
+def test_a_dataset_tells_no_path_of_this_machine(lab: Path) -> None:
+    pytest.importorskip("minari")
+    recipe = Recipe(scene=str(lab), seed=1, dynamism=0.0, seconds=1.0)
+    offline.write(lab.parent / "set", recipe.name, recipe, [])
+    told = (lab.parent / "set" / "data" / "metadata.json").read_text()
+    assert "lab.toml" in told
+    assert lab.parent.name not in told
 
 
 def test_a_comparison_keeps_the_hash_of_its_scenes(lab: Path) -> None:
