@@ -95,7 +95,7 @@ def said(outcome: Mapping[str, Any], primary: str, truth_name: str) -> list[str]
         reference = "" if truth_name == "truth" else f"Against the {truth_name}, "
         first = (
             f"{reference}`{primary}` was off by {_length(own['ate_unaligned_m'])} on average "
-            f"(RMSE) over {outcome['distance_m']:.0f} m; at the end by {off[primary]}{beside}."
+            f"(RMSE) over {_metres(outcome['distance_m'])}; at the end by {off[primary]}{beside}."
         )
     else:
         plural = "" if own["scans"] == 1 else "s"
@@ -106,6 +106,10 @@ def said(outcome: Mapping[str, Any], primary: str, truth_name: str) -> list[str]
 
 def _length(metres: float) -> str:
     return f"{digits(metres)} m" if metres >= 10.0 else f"{digits(100.0 * metres)} cm"
+
+
+def _metres(driven: float) -> str:
+    return f"{driven:.{0 if driven >= 10.0 else 1}f} m"
 
 
 def table(outcome: Mapping[str, Any], title: str) -> Table:

@@ -19,7 +19,7 @@ from msgspec import Meta, Struct
 
 from scenes import is_file
 from scenes.crowd import crowd_of
-from scenes.scene_file import sha256_of
+from scenes.scene_file import located, sha256_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
@@ -169,7 +169,7 @@ class Recipe:
         """Arguments of ``Simulation``."""
         more = {name: getattr(self, name) for name in _LATER if getattr(self, name) is not None}
         return {
-            "scene": self.scene,
+            "scene": located(self.scene),
             "seed": self.seed,
             "dynamism": self.dynamism,
             "laser": self.laser(),
