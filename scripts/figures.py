@@ -261,7 +261,8 @@ def _over_map(path: Path, raster: Raster, track: Trajectory, title: str) -> Iter
     """Axes to draw the map on, of its shape; the trajectory comes over it, then it is saved."""
     height, width = raster.values.shape
     wide = min(11.0, max(5.0, 5.5 * width / height + 2.0))
-    figure, axes = _axes(wide, 6.5, (0.75, 0.1, 0.75, 0.3))
+    high = min(6.5, max(2.5, 1.05 + (wide - 2.0) * height / width))  # a corridor needs little
+    figure, axes = _axes(wide, high, (0.75, 0.1, 0.75, 0.3))
     ax: Axes = axes[0]
     ax.grid(visible=False)
     yield ax
