@@ -51,11 +51,11 @@ def rates() -> dict[str, float]:
 def learn(spent: Iterable[tuple[Work, float]]) -> None:
     """Take in how many seconds each piece of work took. Where nothing can be kept, nothing is.
 
-    A faster one stands at once: a slower one may have compiled, or shared the machine.
+    What it took alone, that is. A faster one stands at once: a slower one may have compiled.
     """
     known = rates()
     for work, seconds in spent:
-        rate = seconds / max(work.amount, 1e-9)
+        rate = seconds / slower(1) / max(work.amount, 1e-9)
         before = known.pop(work.kind, rate)
         known[work.kind] = min(rate, KEPT * before + (1.0 - KEPT) * rate)
     with suppress(OSError):

@@ -42,7 +42,8 @@ def test_a_busy_machine_takes_longer(tmp_path, monkeypatch, capsys):
         assert SLOWER(1, tmp_path / "loadavg") == times
     assert SLOWER(1, tmp_path / "none") == 1.0
     monkeypatch.setattr(pace, "slower", lambda processes: 2.0)
-    pace.learn([(Work("run a"), 10.0)])
+    pace.learn([(Work("run a"), 20.0)])
+    assert pace.estimate([Work("run a")]) == 10.0  # alone
     pace.announce("a run", [Work("run a")])
     assert capsys.readouterr().out == "Ahead: a run; about 20 s beside what else runs here.\n"
 
