@@ -11,18 +11,21 @@ from typing import Any
 from scripts.console import note, working
 from scripts.film.encode import Pace
 from scripts.film.footage import of_log, of_scene
+from scripts.metrics.judged import moved
 from scripts.pace import Work, announce, timed
 from scripts.single_run.log_words import UntrustedRunError, mount_of, tell, tell_distrust
 from scripts.single_run.session import Outputs, run_session
 from scripts.whole_folder import replaceable
-from slam import inputs
+from slam import inputs, se2
 from slam.days.history import History
 from slam.days.session import Session, keep, read_history
 from slam.errors import InvalidValueError, MissingPathError
 from slam.frames import EPOCH, NS_PER_S, Float, Stream
 from slam.logs.bag_topics import Asked
+from slam.replay import Track
 from slam.system import create
 from slam.tracker.tracker import Tracker
+from slam.trajectory import Trajectory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -56,6 +59,19 @@ class Maps:
                 f"--at must be a time such as 2026-05-04T09:00, got {self.at!r}"
             ) from None
         return at.replace(tzinfo=at.tzinfo or UTC).timestamp()
+
+
+class SessionTrack(Track):
+    """Of a session: its poses in the frame of its first one, wherever in the map that is."""
+
+    system: Session
+
+    def online(self) -> Trajectory:
+        """All of them, as what moves the map between two of them is no motion."""
+        return moved(self.system.trajectory(), se2.inverse(self.system.T_map_first))
+
+    def final(self) -> None:
+        """It has no others."""
 
 
 def session_of(name: str, maps: Maps, stream: Stream) -> Session:
@@ -155,7 +171,7 @@ def on_log(
     session = None
     if maps is not None and maps.given:
         session = session_of(show.primary, maps, footage.stream)
-        show.replay.tracks[show.primary].system = session
+        show.replay.tracks[show.primary] = SessionTrack(show.primary, session)
     settings = {
         "slams": list(show.replay.tracks),
         "log": path.name,
