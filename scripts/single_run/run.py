@@ -112,7 +112,8 @@ def kept(session: Session, maps: Maps) -> bool:
     state = session.state
     written = keep(session, target)
     if state.found_after_s is None:
-        note(f"the start was not found in the map; what was mapped lies apart, in {written}")
+        why = "too little of what it saw is known there, or it looks the same elsewhere"
+        note(f"the start was not found in the map: {why}; what was mapped lies in {written}")
     elif not state.fits:
         note(f"the session does not fit the map; what it made of it lies apart, in {written}")
     elif maps.map_in is not None:
