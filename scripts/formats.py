@@ -8,8 +8,7 @@ from dataclasses import dataclass
 from pathlib import Path
 
 from sim.recording import MINARI
-from slam.errors import InvalidValueError
-from slam.names import needed
+from slam.errors import InvalidValueError, needed
 
 BAG = "mcap"
 _EXTRA = "data"

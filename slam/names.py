@@ -17,15 +17,8 @@ from collections.abc import Iterable, Set
 from importlib.util import find_spec
 from itertools import product
 from pathlib import Path
-from types import ModuleType
 
-from slam.errors import (
-    InvalidValueError,
-    MissingDependencyError,
-    MobiliaError,
-    UnknownNameError,
-    UntrustedNameError,
-)
+from slam.errors import InvalidValueError, MobiliaError, UnknownNameError, UntrustedNameError
 
 SAFE_PATH = "PYTHONSAFEPATH"
 OURS = "mobilia"  # the value of SAFE_PATH where it was us who set it
@@ -110,16 +103,6 @@ def load(modules: Iterable[str]) -> None:
             what = f"{type(error).__name__}: {error}"
             raise InvalidValueError(f"module '{name}' fails: {what}") from error
         _loaded.append(name)
-
-
-def needed(module: str, package: str, extra: str = "guests") -> ModuleType:
-    """A package's module; raises ``MissingDependencyError`` that says how to get it."""
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"'{package}' cannot be imported ({error}): pip install 'mobilia[{extra}]'"
-        ) from error
 
 
 def loaded() -> tuple[str, ...]:

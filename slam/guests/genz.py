@@ -17,10 +17,10 @@ from typing import Any
 
 import numpy as np
 
+from slam.errors import needed
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, flattened, lifted, stacked, voxel_m
-from slam.names import needed
 
 
 @contextmanager

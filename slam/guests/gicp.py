@@ -11,10 +11,10 @@ from typing import Any
 import numpy as np
 
 from slam import se2
+from slam.errors import needed
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, flattened, lifted, moved_on, nearest, stacked
-from slam.names import needed
 
 CELL_M = 0.05  # m; one point in each such cell
 APART_M = 0.1  # m between the three layers

@@ -12,10 +12,10 @@ from typing import Any
 import numpy as np
 
 from slam import se2
+from slam.errors import needed
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import NOTHING_M, Guest, check_beams, moved_on, nearest, ranges_of
-from slam.names import needed
 
 RANGE_M = 20.0
 FINE_RAD = math.radians(0.1)

@@ -10,10 +10,10 @@ from typing import Any
 
 import numpy as np
 
+from slam.errors import needed
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import Guest, flattened, lifted, voxel_m
-from slam.names import needed
 
 MAP_M = 100.0  # structure farther from the robot is dropped from its map
 FIRST_M, STILL_M = 0.3, 0.02  # correspondence threshold at the start; motion below it is not learnt
