@@ -3,6 +3,7 @@
 
 import hashlib
 import math
+import os
 from pathlib import Path
 from typing import Annotated, Any, Literal
 
@@ -17,7 +18,8 @@ from scenes.plan_file import MAX_BYTES, MOST_BOXES
 from scenes.recipe import Count
 from scenes.scene import Pose
 from slam.bounded import beside, bytes_of, toml_of
-from slam.errors import InvalidValueError
+from slam.errors import InvalidValueError, MissingPathError
+from slam.names import NameFromFile
 from slam.shaped import Table, one_of, shaped
 
 _Many = Meta(max_length=5000)  # walls, things, doors or pieces of furniture
@@ -158,6 +160,21 @@ def sha256_of(scene: str) -> str | None:
         return None
     each = [hashlib.sha256(bytes_of(f, MAX_BYTES)).digest() for f in files(Path(scene))]
     return hashlib.sha256(b"".join(each)).hexdigest()
+
+
+def located(scene: str) -> str:
+    """A scene by its file that a result names, from where the result was made: above it, else here.
+
+    Raises ``MissingPathError`` where it is in none of these; any other name stays.
+    """
+    if not (is_file(scene) and isinstance(scene, NameFromFile)):
+        return scene
+    for folder in (*Path(scene.file).absolute().parents, Path()):
+        if (folder / scene).is_file():
+            return NameFromFile(os.path.relpath(folder / scene), scene.file)
+    raise MissingPathError(
+        Path(scene), f"no such file here or above {scene.file}: run this in the folder that has it"
+    )
 
 
 def changed(scene: str, sha256: str | None) -> str:

@@ -14,15 +14,16 @@ from rich.table import Table
 
 from scripts import interrupt, workers
 from scripts.console import note, plain_table, progress
-from scripts.formats import MINARI, write_beside
+from scripts.formats import write_beside
 from scripts.options import rate_hz
 from scripts.pace import Work, learn
 from scripts.pages.table import NONE
-from sim.recording.dataset import MAX_BYTES, Dataset, Plan, writing
+from sim.recording import MINARI
+from sim.recording.dataset import MAX_BYTES, PLAN, Dataset, Plan, writing
 from sim.recording.episode import record
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.splits import part_of
-from sim.recording.sums import SUMS, write_sums
+from sim.recording.sums import write_sums
 from slam.bounded import json_of
 from slam.files import part_of as part_folder
 from slam.files import put
@@ -135,19 +136,18 @@ def _offline(plan: Plan, out: Path, ways: dict[str, Any]) -> Table:
         table.add_column(heading, overflow="fold")
     with writing(out, plan) as dataset, progress() as bar:
         task = bar.add_task("driving", total=len(plan.jobs()), unit="")
-        sums = dataset.path / SUMS
-        for name, recipes in rooms_of(plan).items():
+        rooms = rooms_of(plan)
+        for name, recipes in rooms.items():
             folder = dataset.path / name
             if not folder.exists():
-                sums.unlink(missing_ok=True)  # whole no more; else damage would be listed as sound
                 part = part_folder(folder)
                 write(part, name, recipes[0], _drives(recipes, ways, partial(bar.advance, task)))
+                write_sums(part)
                 put(part, folder)
             told = json_of(folder / "data" / "metadata.json", MAX_BYTES, "metadata of Minari")
             keys = ("total_episodes", "total_steps", "description")
             table.add_row(name, *(escape(str(told.get(key, NONE))) for key in keys))
-        if not sums.exists():
-            write_sums(dataset.path)
+        dataset.vouch((PLAN,), rooms)
     return table
 
 

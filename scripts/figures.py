@@ -171,7 +171,7 @@ def trajectories(
     raster: Raster | None,
     truth_name: str,
 ) -> None:
-    """``tracks`` over the map, all in the frame of the first pose (``truth`` already in it)."""
+    """``tracks`` over the map, all in its frame."""
     beside = 0.6 + 0.085 * max(map(len, [*tracks, truth_name, "start"]))  # of the legend, inches
     figure, axes = _axes(9.0, 6.0, (0.75, beside, 0.5, 0.3))
     ax: Axes = axes[0]
@@ -184,7 +184,7 @@ def trajectories(
     if truth is not None:
         ax.plot(truth.poses[:, 0], truth.poses[:, 1], "--", color=COLORS["truth"], lw=1.2,
                 label=truth_name)  # fmt: skip
-    ax.plot(0.0, 0.0, "k+", ms=9, label="start")
+    ax.plot(*next(iter(tracks.values())).poses[0, :2], "k+", ms=9, label="start")
     ax.set(xlabel="x in m", ylabel="y in m", title="Trajectories, online")
     ax.set_aspect("equal", adjustable="datalim")  # the way along a corridor fills no strip
     ax.legend(loc="upper left", bbox_to_anchor=(1.0, 1.0), frameon=False)
@@ -261,7 +261,8 @@ def _over_map(path: Path, raster: Raster, track: Trajectory, title: str) -> Iter
     """Axes to draw the map on, of its shape; the trajectory comes over it, then it is saved."""
     height, width = raster.values.shape
     wide = min(11.0, max(5.0, 5.5 * width / height + 2.0))
-    figure, axes = _axes(wide, 6.5, (0.75, 0.1, 0.75, 0.3))
+    high = min(6.5, max(2.5, 1.05 + (wide - 2.0) * height / width))  # a corridor needs little
+    figure, axes = _axes(wide, high, (0.75, 0.1, 0.75, 0.3))
     ax: Axes = axes[0]
     ax.grid(visible=False)
     yield ax

@@ -7,9 +7,10 @@ The function of the same name in ``scripts.exports`` writes it.
 from dataclasses import dataclass
 from pathlib import Path
 
-from slam.errors import InvalidValueError
+from sim.recording import MINARI
+from slam.errors import InvalidValueError, needed
 
-BAG, MINARI = "mcap", "minari"
+BAG = "mcap"
 _EXTRA = "data"
 
 
@@ -38,8 +39,6 @@ def ready(name: str, *, recorded: bool = True) -> Format:
             "--to minari needs actions, which a recording has none of: "
             "mobilia generate SCENE --format minari"
         )
-    from slam.guests.guest import needed
-
     for package in FORMATS[name].packages:
         needed(package, package, _EXTRA)
     return FORMATS[name]

@@ -3,7 +3,8 @@
 
 import os
 import re
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
+from contextlib import contextmanager
 from itertools import pairwise
 from pathlib import Path
 from typing import Any
@@ -20,20 +21,35 @@ UsageError: Any = BadParameter.__base__  # which typer does not name
 WORDS = "mobilia.words"  # of the command line, in a context
 # Whose fields are filled from options of their own name, where the options do not say otherwise.
 _FILLED = ("Recipe", "Plan", "LoopConfig", "Limits", "Rule", "Question", "Pace", "Dynamism",
-           "Seeds", "Simulation", "World", "FromMap")  # fmt: skip
+           "Seeds", "Session", "Simulation", "World", "FromMap")  # fmt: skip
 _FIELD = re.compile(rf"\b({'|'.join(_FILLED)})\.([a-z_]+)\b")
 _FIRST = re.compile(r"^([a-z_]+)(?=(?:\[\d+\]\.\w+)? must )")
 
 
 class Verbs(TyperGroup):
-    """A group of commands that says in one line which of them it does not know."""
+    """A group of commands that says in one line what it does not know; ``InvalidValueError``."""
 
-    def resolve_command(self, ctx: Any, args: list[str]) -> Any:
-        """As typer's; ``InvalidValueError`` for an unknown command."""
-        try:
-            return super().resolve_command(ctx, args)
-        except UsageError as error:
-            raise InvalidValueError(error.format_message()) from error
+    def parse_args(self, ctx: Any, args: list[str]) -> list[str]:
+        """As typer's, of its own options."""
+        with _in_one_line(ctx):
+            return super().parse_args(ctx, args)
+
+    def invoke(self, ctx: Any) -> Any:
+        """As typer's: finds the command and runs it."""
+        with _in_one_line(ctx):
+            return super().invoke(ctx)
+
+
+@contextmanager
+def _in_one_line(ctx: Any) -> Iterator[None]:
+    try:
+        yield
+    except UsageError as error:
+        if type(error).__name__ == "NoArgsIsHelpError":  # the whole help, which was asked for
+            raise
+        said, group = error.format_message().rstrip("."), f" {ctx.info_name}" if ctx.parent else ""
+        more = "" if said.endswith("?") else f". What there is: mobilia{group} --help"
+        raise InvalidValueError(said + more) from error
 
 
 class Verb(TyperCommand):

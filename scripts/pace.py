@@ -51,11 +51,11 @@ def rates() -> dict[str, float]:
 def learn(spent: Iterable[tuple[Work, float]]) -> None:
     """Take in how many seconds each piece of work took. Where nothing can be kept, nothing is.
 
-    A faster one stands at once: a slower one may have compiled, or shared the machine.
+    What it took alone, that is. A faster one stands at once: a slower one may have compiled.
     """
     known = rates()
     for work, seconds in spent:
-        rate = seconds / max(work.amount, 1e-9)
+        rate = seconds / slower(1) / max(work.amount, 1e-9)
         before = known.pop(work.kind, rate)
         known[work.kind] = min(rate, KEPT * before + (1.0 - KEPT) * rate)
     with suppress(OSError):
@@ -86,10 +86,19 @@ def _like(kind: str, known: dict[str, float]) -> float:
     return median(found) if found else math.nan
 
 
+def slower(processes: int, load: Path = Path("/proc/loadavg")) -> float:
+    """How much longer all takes beside what else runs on these cores; 1 where nobody says."""
+    with suppress(OSError, ValueError):
+        mean, _, _, now, _ = load.read_text().split()
+        others = min(float(mean), int(now.partition("/")[0]) - 1)  # not what has ended since
+        return max(1.0, (others + processes) / (os.cpu_count() or 1))
+    return 1.0
+
+
 def announce(what: str, works: Iterable[Work], processes: int = 1) -> None:
     """Print what will run, and about how long that takes."""
-    seconds = estimate(works, processes)
-    long = "how long is not known yet on this machine" if seconds is None else (
-        f"about {in_time(seconds)}"
-    )  # fmt: skip
+    seconds, busy = estimate(works, processes), slower(processes)
+    long = "how long is not known yet on this machine"
+    if seconds is not None:
+        long = f"about {in_time(seconds * busy)}" + " beside what else runs here" * (busy > 1.2)
     say(f"Ahead: {what}; {long}.", highlight=False)

@@ -139,9 +139,10 @@ def judged(method: object) -> Iterator[None]:
     except SlamFailedError as error:
         raise SlamFailedError(f"{error.message}{place_of(method)}", error.outcome) from error
     except NotFiniteError as error:
-        raise SlamFailedError(f"raised {told(error)}", "nan") from error
+        raise SlamFailedError(f"raised {told(error, method)}", "nan") from error
     except InvalidValueError as error:  # ours begin with the type whose field is wrong
         theirs = not str(error).startswith(("Estimate.", "Raster.", "Trajectory."))
-        raise SlamFailedError(f"raised {told(error)}", "raised" if theirs else "bad") from error
+        outcome = "raised" if theirs else "bad"
+        raise SlamFailedError(f"raised {told(error, method)}", outcome) from error
     except (Exception, SystemExit) as error:
-        raise SlamFailedError(f"raised {told(error)}") from error
+        raise SlamFailedError(f"raised {told(error, method)}") from error

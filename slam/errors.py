@@ -6,8 +6,10 @@ characters, whatever a guest or a file says in it.
 """
 
 import difflib
+import importlib
 from collections.abc import Iterable
 from pathlib import Path
+from types import ModuleType
 
 
 def printable(words: str) -> str:
@@ -115,3 +117,13 @@ class OutputError(MobiliaError, OSError):
 
 class MissingDependencyError(MobiliaError, ImportError):
     """An optional part is needed and not installed; the message says how to get it."""
+
+
+def needed(module: str, package: str, extra: str = "guests") -> ModuleType:
+    """A package's module; raises ``MissingDependencyError`` that says how to get it."""
+    try:
+        return importlib.import_module(module)
+    except ImportError as error:
+        raise MissingDependencyError(
+            f"'{package}' cannot be imported ({error}): pip install 'mobilia[{extra}]'"
+        ) from error

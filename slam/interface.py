@@ -115,25 +115,31 @@ def refuse_at_the_end(system: object, name: str, what: str) -> None:
         )
 
 
-def told(error: BaseException) -> str:
+def told(error: BaseException, method: object = None) -> str:
     """An exception of somebody else's code in one line: type, words, and their last line in it.
 
-    That is the last line outside Python's library, installed packages and this one, if there is
-    any: where their code called NumPy, not the line of NumPy that raised.
+    That is the last line outside Python's library, installed packages and this one: where their
+    code called NumPy, not the line of NumPy that raised. Where there is none, what was wrong is
+    what their ``method`` returned: it is named.
     """
     words = str(error).strip().partition("\n")[0]
     what = f"{type(error).__name__}: {words}" if words else type(error).__name__
     trace = traceback.extract_tb(error.__traceback__)
-    theirs = [at for at in trace if not at.filename.startswith(_LIBRARIES)] or trace
-    return what + (_place(theirs[-1].filename, theirs[-1].lineno) if theirs else "")
+    theirs = [at for at in trace if not at.filename.startswith(_LIBRARIES)]
+    if not theirs and (place := place_of(method)):
+        return what + place
+    last = (theirs or trace)[-1:]
+    return what + "".join(_place(at.filename, at.lineno) for at in last)
 
 
 def place_of(method: object) -> str:
-    """`` (my_slam.py:12)``: where somebody else's method begins; "" for one of ours."""
-    code = getattr(inspect.unwrap(method), "__code__", None) if callable(method) else None
-    if code is None or code.co_filename.startswith(_LIBRARIES):
-        return ""
-    return _place(code.co_filename, code.co_firstlineno)
+    """`` (my_slam.py:12)``: where somebody else's method begins, a guest's ``locate`` where
+    ``update`` is ours; "" for one of ours."""
+    for one in (method, getattr(getattr(method, "__self__", None), "locate", None)):
+        code = getattr(inspect.unwrap(one), "__code__", None) if callable(one) else None
+        if code is not None and not code.co_filename.startswith(_LIBRARIES):
+            return _place(code.co_filename, code.co_firstlineno)
+    return ""
 
 
 def _place(file: str, line: int | None) -> str:

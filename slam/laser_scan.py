@@ -64,7 +64,12 @@ class LaserScanNames:
                 "Scan.time_increment: these beams were not measured one after the other, "
                 "counter-clockwise; Scan.spec.beam_time_offsets has the time of each"
             )
-        return self.scan_time / math.tau * self.angle_increment
+        return time_increment(self.scan_time, self.angle_increment)
+
+
+def time_increment(scan_time: float, angle_increment: float) -> float:
+    """s from beam to beam, either way round, as ROS's driver of the SICK states it."""
+    return scan_time / math.tau * abs(angle_increment)
 
 
 def turns_of(spec: "LaserSpec") -> int:

@@ -128,6 +128,7 @@ def plan(map_: Raster, options: FromMap | None = None, *, source: str = "map") -
         start=options.start, path=options.path, robot_m=options.robot_m, source=source,
     )  # fmt: skip
     check_span(source, floor.bounds)
+    _check_walls(np.vstack([walls, floor.ends]), source)
     return MapPlan(
         walls=_moved(walls, T_map_cells),
         ends=_moved(floor.ends, T_map_cells),
@@ -157,13 +158,17 @@ def _built(
         walls = boxes_of(solid, cell, options.tolerance_m, few=options.few)
     except InvalidValueError as error:
         raise InvalidValueError(f"{source}: {error} ({NOISE})") from None
+    _check_walls(walls, source)
+    return things, solid, walls
+
+
+def _check_walls(walls: Float, source: str) -> None:
     length = 2.0 * float(walls[:, 2].sum())
     if length > MAX_WALL_M or len(walls) > MOST_WALLS:
         raise InvalidValueError(
             f"{source}: {length:.0f} m of walls in {len(walls)} pieces, expected at most "
             f"{MAX_WALL_M:g} m and {MOST_WALLS} ({NOISE})"
         )
-    return things, solid, walls
 
 
 def _cropped(map_: Raster) -> Raster:

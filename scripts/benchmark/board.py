@@ -205,18 +205,17 @@ class Board:
     def _by_track(self, every: Sequence[Row]) -> list[str]:
         own = [row for row in every if row["counts"]]
         out = []
-        lost = sorted(
-            (r for r in own if math.isfinite(r["lost_from"])), key=lambda r: r["lost_from"]
-        )
+        lost = [row for row in own if math.isfinite(row["lost_from"])]
         if lost:
-            told = "; ".join(f"{r['track']} from level {_from(r)} on" for r in lost)
+            first = sorted(lost, key=lambda row: row["lost_from"])
+            told = "; ".join(f"{r['track']} from level {lost_from_words(r)} on" for r in first)
             out.append(f"`{self.subject}` is lost in half of the runs in {told}.")
         if kept := [row["track"] for row in own if math.isinf(row["lost_from_low"])]:
             so = "It is" if lost else f"`{self.subject}` is"
             out.append(f"{so} not lost in half of the runs at any level of {', '.join(kept)}.")
         open_ = [r for r in own if math.isinf(r["lost_from"]) and math.isfinite(r["lost_from_low"])]
         if open_:
-            told = ", ".join(f"{r['track']} {_from(r)}" for r in open_)
+            told = ", ".join(f"{r['track']} {lost_from_words(r)}" for r in open_)
             out.append(f"Whether half of its runs are lost cannot be told in {told}.")
         worse = [row["track"] for row in own if self._worse_than_wheels(row["track"])]
         if worse and self.subject != ODOMETRY:
@@ -271,13 +270,12 @@ class Board:
             parts += [f"## On the same {self.ranking[0]['runs']} runs", _RANKED]
             parts.append(table(RANKED_HEADS, self.ranked(), left=2))
         parts += ["## Lost from which level", _LOST]
-        heads = ["track", "counts", *self.slams]
         lines = [
             [t.name, "yes" if self.fair[t.name]["counts"] else "no",
              *(lost_from_words(self.row(t.name, slam)) for slam in self.slams)]
             for t in self.tracks
         ]  # fmt: skip
-        parts.append(table(heads, lines))
+        parts.append(table(["track", "counts", *self.slams], lines))
         for track in self.tracks:
             parts += self._section(track)
         parts += [self.days_page] if self.days_page else []
@@ -289,8 +287,9 @@ class Board:
         for row in self.ranking:
             control = self.is_control(row["slam"])
             place += not control
+            level = lost_from_words(row | {"seeds": LEAST_RUNS})
             lines.append([
-                "–" if control else str(place), row["slam"], _from(row | {"seeds": LEAST_RUNS}),
+                "–" if control else str(place), row["slam"], level,
                 f"{row['lost_runs']} of {row['runs']}", _number(TRACKING, CM)(row),
             ])  # fmt: skip
         return lines
@@ -326,7 +325,7 @@ class Board:
             + ".",
             *(of_oracle if fair["oracle_runs"] else decided),
         )
-        rows = [row for slam in self.slams if (row := self.row(track.name, slam))]
+        rows = (row for slam in self.slams if (row := self.row(track.name, slam)))
         lines = [[row["slam"], *(show(row) for _, show in _CELLS)] for row in rows]
         return [
             f"## {track.name}",
@@ -362,8 +361,11 @@ _LOST = (
 )
 
 
-def _from(row: Row) -> str:
-    """The level with its interval; without where there are too few runs for one."""
+def lost_from_words(row: Row | None) -> str:
+    """The level with its interval, "0.43 [0.31, 0.6]" or "> 1 [0.9, > 1]"; without one where there
+    are too few runs; "never"; a dash."""
+    if row is None:
+        return "–"
     value, low, high = row["lost_from"], row["lost_from_low"], row["lost_from_high"]
     if row["seeds"] < LEAST_RUNS:
         return _level(value)
@@ -386,7 +388,7 @@ def _number(key: str, factor: float = 1.0) -> Callable[[Row], str]:
 
 
 _CELLS: tuple[tuple[str, Callable[[Row], str]], ...] = (
-    ("lost from", _from),
+    ("lost from", lost_from_words),
     ("lost runs", lambda row: f"{row['lost_runs']} of {row['runs']}"),
     ("error while not lost, cm", _number(TRACKING, CM)),
     ("of runs", lambda row: str(row[f"{TRACKING}_runs"])),
@@ -396,8 +398,3 @@ _CELLS: tuple[tuple[str, Callable[[Row], str]], ...] = (
     ("p99.9", _number("ms_per_scan_p999")),
     ("memory, MB", _number("peak_memory_mb")),
 )
-
-
-def lost_from_words(row: Row | None) -> str:
-    """A cell of the first table: "0.43 [0.31, 0.6]", "> 1 [0.9, > 1]", "never", or a dash."""
-    return "–" if row is None else _from(row)

@@ -6,6 +6,7 @@ from dataclasses import dataclass, fields
 from pathlib import Path
 from typing import Any
 
+from scenes.scene_file import located
 from scripts.comparison.plan import Plan
 from scripts.names import RUNS, is_run
 from scripts.options import admitted
@@ -82,7 +83,8 @@ def again(path: Path, trust: bool = False) -> Again:
     _check_settings(recipe, settings)
     check_world(recipe, world_of(recipe, words))
     world = {key: value for key, value in settings.items() if key not in OF_THE_RUN}
-    world["scene"] = admitted(scenes_of(recipe, {"scene": settings["scene"]})[0], "scene", trust)
+    (scene,) = scenes_of(recipe, {"scene": settings["scene"]})
+    world["scene"] = located(admitted(scene, "scene", trust))
     return Again(settings=world, seconds=settings["seconds"], slams=slams)
 
 
@@ -94,7 +96,7 @@ def _episodes_in(folder: Path) -> str:
 
 def _of(recipe: Recipe, trust: bool, **more: Any) -> Again:
     settings = {key: value for key, value in recipe.simulation().items() if key != "labels"}
-    settings["scene"] = admitted(recipe.scene, "scene", trust)
+    settings["scene"] = admitted(settings["scene"], "scene", trust)
     return Again(settings=settings, seconds=recipe.seconds, **more)
 
 

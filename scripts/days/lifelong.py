@@ -21,7 +21,7 @@ from scripts.names import file_name
 from scripts.result_files import load
 from slam import se2
 from slam.days.evidence import Snapshot
-from slam.days.session import Session, keep
+from slam.days.session import Session, keep, searched
 from slam.errors import LogFormatError, SlamFailedError
 from slam.files import write_text
 from slam.frames import NS_PER_S, Float
@@ -145,12 +145,12 @@ def _merged(building: Building, drive: SessionDrive, session: Session, track: Tr
     state, first, truth_0 = session.state, not building.map.exists(), drive.frames[0].truth
     if first and truth_0 is not None:
         building.T_map_world = se2.inverse(truth_0)
-    searched = _searched(track)
+    looked = searched(track.estimates)
     row: Row = {
         "start": _start(session, building.T_map_world, drive),
         "disagrees": None if first or state.found_after_s is None else state.disagrees,
         "found_after_s": state.found_after_s, "tracked": state.tracked,
-        **_errors(building.T_map_world, drive, track, searched),
+        **_errors(building.T_map_world, drive, track, looked),
     }  # fmt: skip
     written = keep(session, building.map)
     row["map"] = "new" if first else "merged" if state.fits else written.name
@@ -160,7 +160,7 @@ def _merged(building: Building, drive: SessionDrive, session: Session, track: Tr
         row |= _map_scores(building.T_map_world, drive, track)
         if building.before is not None and drive.recording is not None:
             shares = truth.changed_share(building.before, drive.recording)
-            row |= truth.verdicts(track.estimates, shares, searched)
+            row |= truth.verdicts(track.estimates, shares, looked)
     if state.fits:  # else the map knows nothing of it
         building.before = drive.recording
         building.snapshots[drive.number] = session.known().sessions[-1]
@@ -168,11 +168,6 @@ def _merged(building: Building, drive: SessionDrive, session: Session, track: Tr
             building.map, building.map.parent / "maps", drive.number
         )
     return row
-
-
-def _searched(track: Track) -> int:
-    """Scans before the start was found."""
-    return sum(e.diagnostics.get("state") == "searching" for e in track.estimates)
 
 
 def _age_rows(building: Building, drive: SessionDrive) -> Iterator[Row]:
@@ -187,7 +182,7 @@ def _age_rows(building: Building, drive: SessionDrive) -> Iterator[Row]:
             continue
         state = session.state
         row |= {"found_after_s": state.found_after_s, "tracked": state.tracked}
-        yield row | _errors(building.T_map_world, drive, track, _searched(track))
+        yield row | _errors(building.T_map_world, drive, track, searched(track.estimates))
 
 
 def _start(session: Session, T_map_world: Float | None, drive: SessionDrive) -> str:
@@ -222,9 +217,9 @@ def _survive(building: Building, drive: SessionDrive, track: Track) -> SlamFaile
         return track.survive(recorder.noting(drive.frames))
 
 
-def _errors(T_map_world: Float | None, drive: SessionDrive, track: Track, searched: int) -> Row:
+def _errors(T_map_world: Float | None, drive: SessionDrive, track: Track, looked: int) -> Row:
     """Of the poses from the scan on that found the start; ``place`` is where that was."""
-    if searched == len(track.estimates):
+    if looked == len(track.estimates):
         return {"place": "not found"}
     if T_map_world is None or drive.frames[0].truth is None:
         return {"place": ""}
@@ -234,7 +229,7 @@ def _errors(T_map_world: Float | None, drive: SessionDrive, track: Track, search
             for frame, estimate in zip(drive.frames, track.estimates, strict=True)
             if frame.truth is not None
         ]
-    )[searched:]
+    )[looked:]
     away = np.hypot(off[:, 0], off[:, 1])
     right = away[0] < RIGHT_M and abs(off[0, 2]) < RIGHT_RAD
     return {

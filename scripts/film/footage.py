@@ -9,6 +9,7 @@ from typing import Any
 
 import numpy as np
 
+from scenes import is_file
 from scripts.comparison.again import Again, again
 from scripts.film.encode import SIZE, Pace, Size
 from scripts.film.show import Show
@@ -243,4 +244,6 @@ def title_of(settings: Mapping[str, Any]) -> str:
     twin = f" · {settings['twin']} twin" if settings.get("twin") else ""
     knobs = [f"{k} {settings[k]}" for k in KNOBS if settings.get(k) is not None]
     dynamism, seed = settings.get("dynamism", 0.5), settings.get("seed", 0)
-    return " · ".join([settings["scene"], f"dynamism {dynamism}", *knobs, f"seed {seed}{twin}"])
+    scene = settings["scene"]
+    scene = Path(scene).name if is_file(scene) else scene
+    return " · ".join([scene, f"dynamism {dynamism}", *knobs, f"seed {seed}{twin}"])

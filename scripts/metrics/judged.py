@@ -32,9 +32,13 @@ def world_truth(frames: Sequence[Frame]) -> Trajectory:
 
 def in_first_frame(truth: Trajectory) -> Trajectory:
     """The truth as seen from its own first pose, the frame in which a SLAM starts."""
-    T_first_world = se2.inverse(truth.poses[0])
-    poses = np.array([se2.compose(T_first_world, T_world_robot) for T_world_robot in truth.poses])
-    return Trajectory(stamps_ns=truth.stamps_ns, poses=poses)
+    return moved(truth, se2.inverse(truth.poses[0]))
+
+
+def moved(path: Trajectory, T_to_from: Float) -> Trajectory:
+    """The same in another frame."""
+    poses = np.array([se2.compose(T_to_from, pose) for pose in path.poses]).reshape(-1, 3)
+    return Trajectory(stamps_ns=path.stamps_ns, poses=poses)
 
 
 @dataclass(frozen=True, kw_only=True, eq=False)

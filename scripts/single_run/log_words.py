@@ -10,6 +10,7 @@ import numpy as np
 from scripts.console import say
 from scripts.film.footage import Footage
 from scripts.options import place_of
+from slam.days.session import searched
 from slam.errors import InvalidValueError, MobiliaError
 from slam.frames import Float, StreamMetadata
 from slam.logs.mounting import Mounting
@@ -184,7 +185,8 @@ def distrust(track: Track, footage: Footage, found: Sequence[Mounting]) -> str:
 
     The causes come in the order of their likelihood: what the log itself gives away first.
     """
-    share = float(np.mean([not one.converged for one in track.estimates]))
+    told_apart = track.estimates[searched(track.estimates) :]  # what was looked for is no doubt
+    share = float(np.mean([not one.converged for one in told_apart]))
     if share <= UNTRUSTED:
         return ""
     causes: list[str] = []

@@ -11,18 +11,21 @@ from typing import Any
 from scripts.console import note, working
 from scripts.film.encode import Pace
 from scripts.film.footage import of_log, of_scene
+from scripts.metrics.judged import moved
 from scripts.pace import Work, announce, timed
-from scripts.single_run.log_words import mount_of, tell, tell_distrust
+from scripts.single_run.log_words import UntrustedRunError, mount_of, tell, tell_distrust
 from scripts.single_run.session import Outputs, run_session
 from scripts.whole_folder import replaceable
-from slam import inputs
+from slam import inputs, se2
 from slam.days.history import History
 from slam.days.session import Session, keep, read_history
 from slam.errors import InvalidValueError, MissingPathError
 from slam.frames import EPOCH, NS_PER_S, Float, Stream
 from slam.logs.bag_topics import Asked
+from slam.replay import Track
 from slam.system import create
 from slam.tracker.tracker import Tracker
+from slam.trajectory import Trajectory
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -58,6 +61,19 @@ class Maps:
         return at.replace(tzinfo=at.tzinfo or UTC).timestamp()
 
 
+class SessionTrack(Track):
+    """Of a session: its poses in the frame of its first one, wherever in the map that is."""
+
+    system: Session
+
+    def online(self) -> Trajectory:
+        """All of them, as what moves the map between two of them is no motion."""
+        return moved(self.system.trajectory(), se2.inverse(self.system.T_map_first))
+
+    def final(self) -> None:
+        """It has no others."""
+
+
 def session_of(name: str, maps: Maps, stream: Stream) -> Session:
     """A session of that SLAM; ``InvalidValueError`` for one that cannot load a map."""
     system = create(name)
@@ -67,11 +83,6 @@ def session_of(name: str, maps: Maps, stream: Stream) -> Session:
         )
     history = None if maps.map_in is None else read_history(maps.map_in)
     time_s = _time_s(maps, stream, history)
-    if history is not None and len(history) and time_s <= history.times_s[-1]:
-        raise InvalidValueError(
-            f"the session begins at {time_s:.15g} s, not after the last one of the map, at "
-            f"{history.times_s[-1]:.15g} s: say when it was, as --at 2026-05-04T09:00"
-        )
     if maps.map_in is None:
         return Session(system, time_s=time_s)
     return Session.open(maps.map_in, type(system), time_s=time_s)
@@ -89,8 +100,11 @@ def _time_s(maps: Maps, stream: Stream, history: History | None) -> float:
     return 0.0
 
 
-def kept(session: Session, maps: Maps) -> None:
-    """Write the map where ``--map-out``, else ``--map-in``, says, and tell how it went."""
+def kept(session: Session, maps: Maps) -> bool:
+    """Write the map where ``--map-out``, else ``--map-in``, says, and tell how it went.
+
+    Returns whether the start was found.
+    """
     target = maps.map_out or maps.map_in
     assert target is not None
     if maps.map_out is None:
@@ -98,13 +112,15 @@ def kept(session: Session, maps: Maps) -> None:
     state = session.state
     written = keep(session, target)
     if state.found_after_s is None:
-        note(f"the start was not found in the map; what was mapped lies apart, in {written}")
+        why = "too little of what it saw is known there, or it looks the same elsewhere"
+        note(f"the start was not found in the map: {why}; what was mapped lies in {written}")
     elif not state.fits:
         note(f"the session does not fit the map; what it made of it lies apart, in {written}")
     elif maps.map_in is not None:
         note(f"found after {state.found_after_s:.1f} s; the map with this session is {written}")
     else:
         note(f"the map of this session is {written}")
+    return state.found_after_s is not None
 
 
 @dataclass(frozen=True, kw_only=True)
@@ -156,7 +172,7 @@ def on_log(
     session = None
     if maps is not None and maps.given:
         session = session_of(show.primary, maps, footage.stream)
-        show.replay.tracks[show.primary].system = session
+        show.replay.tracks[show.primary] = SessionTrack(show.primary, session)
     settings = {
         "slams": list(show.replay.tracks),
         "log": path.name,
@@ -168,9 +184,10 @@ def on_log(
         pace=Pace.of_log(footage.duration_s, footage.stream.length or 1),
     )  # fmt: skip
     results = run_session(footage.stream, show, outputs)
-    if session is not None and maps is not None:
-        kept(session, maps)
-    tell_distrust(show.track(), footage, found, strict=log.strict)
+    if session is None or maps is None or kept(session, maps):
+        tell_distrust(show.track(), footage, found, strict=log.strict)
+    elif log.strict:  # the one cause of its doubt
+        raise UntrustedRunError("the start was not found in the map (refused by --strict)")
     return results
 
 

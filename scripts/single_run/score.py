@@ -11,6 +11,7 @@ from rich.table import Table
 
 from scripts.metrics.judged import Judged
 from scripts.metrics.table import IN_RUN, digits, minus
+from slam.days.session import searched
 from slam.evaluation.consistency import KeptScans
 from slam.replay import Replay, Track
 from slam.trajectory import Trajectory
@@ -56,6 +57,8 @@ def scores(track: Track, truth: Trajectory | None, duration_s: float) -> dict[st
         duration_s=duration_s,
     )
     block = {"scans": len(track.estimates), **_block(judged)}
+    if looked := searched(track.estimates):
+        block["searched"] = looked
     final = track.final() if judged.truth is not None else None
     if final is not None:
         errors = _block(Judged(estimate=final, truth=truth), section="errors")
@@ -95,17 +98,24 @@ def said(outcome: Mapping[str, Any], primary: str, truth_name: str) -> list[str]
         reference = "" if truth_name == "truth" else f"Against the {truth_name}, "
         first = (
             f"{reference}`{primary}` was off by {_length(own['ate_unaligned_m'])} on average "
-            f"(RMSE) over {outcome['distance_m']:.0f} m; at the end by {off[primary]}{beside}."
+            f"(RMSE) over {_metres(outcome['distance_m'])}; at the end by {off[primary]}{beside}."
         )
     else:
         plural = "" if own["scans"] == 1 else "s"
         first = f"`{primary}` ran through {own['scans']} scan{plural}; without truth, no errors."
-    doubted = own.get("not_converged", 0)
-    return [first, *([f"It did not trust {doubted} of {own['scans']} scans."] if doubted else [])]
+    looked, scans = own.get("searched", 0), own["scans"]
+    doubted = own.get("not_converged", 0) - looked
+    looking = f"It looked for its start in the map for {looked} of {scans} scans."
+    doubting = f"It did not trust {doubted} of {scans} scans."
+    return [first, *[looking] * (looked > 0), *[doubting] * (doubted > 0)]
 
 
 def _length(metres: float) -> str:
     return f"{digits(metres)} m" if metres >= 10.0 else f"{digits(100.0 * metres)} cm"
+
+
+def _metres(driven: float) -> str:
+    return f"{driven:.{0 if driven >= 10.0 else 1}f} m"
 
 
 def table(outcome: Mapping[str, Any], title: str) -> Table:

@@ -14,6 +14,7 @@ from pathlib import Path
 from typing import Any
 
 import imageio.v2 as imageio
+import numpy as np
 from rich.markup import escape
 from rich.table import Table
 
@@ -25,7 +26,7 @@ from scripts.film.render import Liveliest, shoot, watched
 from scripts.film.show import Show
 from scripts.live.replay import Recorder
 from scripts.machine import machine
-from scripts.metrics.judged import in_first_frame
+from scripts.metrics.judged import in_first_frame, moved
 from scripts.names import file_name, scene_name
 from scripts.output import write_recipe
 from scripts.pages import page as pages
@@ -250,9 +251,12 @@ def _write_map(folder: Path, show: Show) -> Drawn | None:
 def _draw(folder: Path, show: Show, found: Drawn | None) -> None:
     """Trajectories, errors, the map and what changed in it."""
     online = {name: track.online() for name, track in show.replay.tracks.items()}
-    truth, own = _truth(show.replay), online[show.primary]
+    truth = _truth(show.replay)
     if truth is not None:
         figures.errors(folder / "errors.png", online, truth)
+    T_map_first = getattr(show.track().system, "T_map_first", np.zeros(3))  # of a session
+    online = {name: moved(path, T_map_first) for name, path in online.items()}
+    truth, own = truth and moved(truth, T_map_first), online[show.primary]
     raster = None if found is None else found.map
     figures.trajectories(
         folder / "trajectories.png", online, truth, raster, show.moments.truth_name

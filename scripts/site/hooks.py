@@ -22,6 +22,8 @@ ROOT = Path(__file__).resolve().parents[2]
 REPLAYS = ROOT / "out" / "replays"
 OUTSIDE = {"CONTRIBUTING.md": "contributing.md", "CHANGELOG.md": "changelog.md"}
 RESULTS = "results.md"  # the page of the folder docs/results
+CODE = ("contributing.md", "layout.md", "dependencies.md", RESULTS)
+OF_CODE, OF_JOBS = 0.2, 2.0  # weights of pages in a search; set by hand
 INSTEAD = {"README.md": "index.md", "docs/results": RESULTS, **OUTSIDE}  # which page shows what
 _LINK = re.compile(r"(?<=\]\()([^)\s#]+)")
 _CLIP = re.compile(r'<a href="([^"]+\.mp4)"><img alt="([^"]*)" src="([^"]+)" ?/?></a>')
@@ -49,9 +51,12 @@ def _results() -> str:
 
 
 def on_page_markdown(markdown: str, *, page: "Page", config: "MkDocsConfig", files: "Files") -> str:
-    """Links to files at the root, and to the folder of results, lead to their pages."""
+    """Links to files at the root, and to the folder of results, lead to their pages. Who searches
+    finds the user's pages first, and no changelog."""
     del config, files
-    folder = posixpath.dirname(page.file.src_uri)
+    name, folder = page.file.src_uri, posixpath.dirname(page.file.src_uri)
+    boost = OF_CODE if folder == "api" or name in CODE else OF_JOBS if folder == "jobs" else 1.0
+    page.meta["search"] = {"boost": boost, "exclude": name == OUTSIDE["CHANGELOG.md"]}
 
     def at_root(link: re.Match[str]) -> str:
         target = posixpath.normpath(posixpath.join("docs", folder, link[1]))

@@ -24,8 +24,8 @@ from scripts.report.answer import ODOMETRY
 from scripts.tuning.search import JUDGED, Search, Task, Trial
 from scripts.tuning.space import defaults
 from scripts.tuning.verdict import Verdict, judge
+from slam.errors import needed
 from slam.files import write_text
-from slam.guests.guest import needed
 
 COMMAND = "tune"
 

@@ -27,8 +27,8 @@ from scripts.tuning.run import run
 from scripts.tuning.space import Space, defaults, variant
 from slam.archives import read_arrays
 from slam.bounded import json_of
+from slam.errors import needed
 from slam.files import write_text
-from slam.guests.guest import needed
 from slam.shaped import within
 
 SEED = 1  # of the sampler

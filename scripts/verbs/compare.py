@@ -93,7 +93,8 @@ class Compare:
         asked = study(plan, beside(plan) if plan.sessions is not None else None)
         engine.refuse(asked, self.out)
         missing, every_job = ahead(plan, self.out)
-        runs = f"{len(plan.runs())} runs, {len(plan.slams)} SLAMs on each"
+        n = len(plan.slams)
+        runs = f"{len(plan.runs())} runs, {n} SLAM{'s' if n > 1 else ''} on each"
         besides = ", buildings besides" if plan.sessions is not None else ""
         told = f"{runs}: {len(missing)} of {every_job} jobs are to do{besides}"
         pace.announce(told, [job.work() for job in missing], self.work.jobs)

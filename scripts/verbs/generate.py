@@ -8,9 +8,10 @@ from typing import TYPE_CHECKING
 from scenes import registry
 from scripts import options
 from scripts.console import console
-from scripts.formats import BAG, FORMATS, MINARI, ready
+from scripts.formats import BAG, FORMATS, ready
 from scripts.names import check
 from scripts.spec import REQUIRED, SCENES, argument, command_line, names_of, option, part, spec
+from sim.recording import MINARI
 from slam.errors import InvalidValueError
 from slam.names import is_code
 

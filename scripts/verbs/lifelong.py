@@ -6,10 +6,8 @@ from datetime import UTC, datetime, timedelta
 from pathlib import Path
 from typing import TYPE_CHECKING, Any
 
-from rich.markup import escape
-
 from scripts import options
-from scripts.console import console, say, working
+from scripts.console import console, working
 from scripts.names import check
 from scripts.spec import SCENES, SLAMS, argument, command_line, option, part, spec
 from slam.errors import InvalidValueError
@@ -145,19 +143,16 @@ class Lifelong:
             changed = Changed() if living is None else changes_of(folder, living, kept)
             tables.write(folder, rows, settings, changed.score, aged)
             by_slam = {name: [row for row in rows if row["slam"] == name] for name in names}
-            said = {b.name: _sentence(b, by_slam[b.name], aged) for b in buildings}
+            said = [_sentence(building, by_slam[building.name], aged) for building in buildings]
             lives = [
-                Part(
-                    title=f"The life of {name}", note=said[name],
-                    table=tables.printed(name, own, whole=True),
-                )
+                Part(title=f"The life of {name}", table=tables.printed(name, own, whole=True))
                 for name, own in by_slam.items()
-            ]  # fmt: skip
+            ]
             older = [Part(title="Older maps", table=tables.ages_table(aged))] if aged else []
             first = names[0] if living is None else living.name
             page = Page(
                 title=f"A building over {len(kept)} sessions",
-                said=[tables.last_session(by_slam[first], changed.said)],
+                said=[*said, tables.last_session(by_slam[first], changed.said)],
                 parts=[*changed.parts, *lives, *older], settings=settings,
                 next={} if living is None else {
                     "A session of your own in this map:": command_line(
@@ -170,7 +165,6 @@ class Lifelong:
             write_page(folder, page)
         for name, own in by_slam.items():
             console.print(tables.printed(name, own))
-            say(escape(said[name]))
         tell(path, page)
 
 

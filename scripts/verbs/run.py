@@ -44,7 +44,10 @@ class Run:
         "Begin anywhere in this map of days before (docs/days.md); with --log."
     )
     map_out: Path | None = option("Keep the map, this session included; with --log.", writes="file")
-    at: str | None = option("When the session began, 2026-05-04T09:00; default the log's clock.")
+    at: str | None = option(
+        "When the session began, 2026-05-04T09:00; default the log's clock.",
+        fills=("Session.time_s",),
+    )
     oracle: list[str] | None = options.ORACLES()
     set_: list[str] | None = options.SET()
 

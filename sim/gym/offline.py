@@ -109,12 +109,17 @@ def _stacked(rows: list[dict[str, Any]]) -> dict[str, NDArray[Any]]:
 
 
 def write(folder: Path, name: str, recipe: Recipe, drives: Iterable[Drive]) -> None:
-    """A dataset of Minari called ``name`` in ``folder``, one drive of that room after the other."""
+    """A dataset of Minari called ``name`` in ``folder``, one drive of that room after the other.
+
+    Of a scene by its file it tells the file's name: a path is of this machine.
+    """
     minari = importlib.import_module("minari")
     buffer = importlib.import_module("minari.data_collector.episode_buffer").EpisodeBuffer
     storage_of = importlib.import_module("minari.dataset.minari_storage").MinariStorage
     spec = spec_of(recipe)
     env = MobiliaEnv(**spec.kwargs)
+    if is_file(recipe.scene):
+        spec.kwargs["scene"] = Path(recipe.scene).name
     (folder / "data").mkdir(parents=True)
     storage = storage_of.new(
         folder / "data", observation_space=env.observation_space, action_space=env.action_space,

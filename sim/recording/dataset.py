@@ -4,12 +4,13 @@
 import json
 import os
 import shutil
-from collections.abc import Iterator, Mapping, Sequence
+from collections.abc import Iterable, Iterator, Mapping, Sequence
 from contextlib import contextmanager
 from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 
 from sim.core.versions import check_world
+from sim.recording import MINARI
 from sim.recording.recipe import RECIPE, Recipe, read_recipe
 from sim.recording.splits import Split, checked_split, file_of, list_text, part_of
 from sim.recording.sums import SUMS, Fault, faults, foreign, read_sums, sha256, text_of
@@ -25,7 +26,6 @@ from slam.shaped import instance, whole
 PLAN = "dataset.json"
 PAGE = "index.html"  # for who looks at it; listed where ``generate`` came as far as that
 SCHEMA = 1
-MINARI = "minari"  # ``Plan.format`` of a dataset without bags
 MAX_EPISODES = 1_000_000
 MAX_BYTES = 1 << 20  # of dataset.json
 
@@ -75,7 +75,7 @@ class Plan:
             )
         names = [name for recipe in self.jobs() for name in self.folders(recipe)]
         if len(set(names)) != len(names):
-            raise InvalidValueError("Plan.dynamisms are too close: two episodes have one name")
+            raise InvalidValueError("Plan: two episodes have one name (scenes, dynamisms)")
 
     def _check_parts(self) -> None:
         object.__setattr__(self, "scenes", tuple(self.scenes))
@@ -192,14 +192,18 @@ class Dataset:
         return wanted, notes
 
     def finish(self) -> None:
-        """Write SHA256SUMS over the plan and all files of all episodes, their own SHA256SUMS among
-        them; ``OutputError`` when one is missing."""
+        """Write the truth of sessions and the lists of parts, and vouch for all; raises as that."""
         if self.plan.sessions:
             write_days(self.path, self.plan.recipe, self.plan.sessions)
         for part, names in self.plan.parts().items():
             write_text(self.path / file_of(part), list_text(names))
-        sums = {name: sha256(self.path / name) for name in self.plan.files}
-        for name in self.plan.planned():
+        self.vouch(self.plan.files, self.plan.planned())
+
+    def vouch(self, files: Iterable[str], folders: Iterable[str]) -> None:
+        """Write SHA256SUMS over these files and all that the SHA256SUMS of the folders list, so
+        that damage is never listed as sound; ``OutputError`` when one is missing."""
+        sums = {name: sha256(self.path / name) for name in files}
+        for name in folders:
             try:
                 sums |= _sums_of(self.path / name)
             except LogFormatError as error:

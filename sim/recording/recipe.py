@@ -17,8 +17,9 @@ from typing import Annotated, Any, Literal
 import numpy as np
 from msgspec import Meta, Struct
 
+from scenes import is_file
 from scenes.crowd import crowd_of
-from scenes.scene_file import sha256_of
+from scenes.scene_file import located, sha256_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
@@ -168,7 +169,7 @@ class Recipe:
         """Arguments of ``Simulation``."""
         more = {name: getattr(self, name) for name in _LATER if getattr(self, name) is not None}
         return {
-            "scene": self.scene,
+            "scene": located(self.scene),
             "seed": self.seed,
             "dynamism": self.dynamism,
             "laser": self.laser(),
@@ -190,7 +191,8 @@ class Recipe:
         ``moving_share``, ``-at`` for ``change_at_s`` and ``-kidnap`` for ``kidnap_every_s``, and
         ``-events`` with a checksum of them.
         """
-        scene = re.sub(r"[^A-Za-z0-9_.]+", "-", self.scene).strip("-.")
+        scene = Path(self.scene).name if is_file(self.scene) else self.scene
+        scene = re.sub(r"[^A-Za-z0-9_.]+", "-", scene).strip("-.")
         twin = f"-{self.twin}" if self.twin else ""
         session = "" if self.session is None else f"-session{self.session:02d}"
         levels = [(axis[0], getattr(self, axis)) for axis in ("dynamism", *_AXES)]

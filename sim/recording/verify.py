@@ -8,7 +8,7 @@ from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Literal, cast
 
-from scenes.scene_file import changed
+from scenes.scene_file import changed, located
 from sim.core.versions import not_this_world
 from sim.recording import topics
 from sim.recording.bag import FORMAT, FORMATS, MessageHash
@@ -18,6 +18,7 @@ from sim.recording.sums import SUMS, Fault, check_vouched, faults, read_sums
 from sim.recording.tables import REARRANGED
 from slam.errors import LogFormatError, OutputError
 from slam.logs.bag_topics import Bag
+from slam.names import is_code
 
 Verdict = Literal[
     "whole", "damaged", "incomplete", "foreign", "same bytes", "same messages", "differs",
@@ -166,11 +167,11 @@ def regenerate(folder: Path, *, trust: bool = False) -> Finding:
         why = f"not made again: it has topics {wanted!r:.200}, not {here}: load them, --with"
         return Finding(episode=folder.name, verdict="differs", why=why)
     recipe = made.recipe
-    if why := changed(recipe.scene, recipe.scene_sha256):
+    if why := changed(located(recipe.scene), recipe.scene_sha256):
         return Finding(
             episode=folder.name, verdict="differs", why=f"not made again: {recipe.scene} {why}"
         )
-    if trust:
+    if trust and is_code(recipe.scene):
         recipe = replace(recipe, scene=str(recipe.scene))  # as if it had been typed
     with _scratch() as scratch:
         record(recipe, Path(scratch))

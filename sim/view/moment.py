@@ -4,7 +4,7 @@
 import math
 from array import array
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -119,6 +119,11 @@ class Path:
         self._xy.extend(pose[:2].tolist())
         self.pose = pose
 
+    def move(self, T_new_old: Float) -> None:
+        """Into another frame."""
+        xy = np.array(self._xy).reshape(-1, 2)
+        self._xy = array("d", se2.transform(T_new_old, xy).ravel())
+
     def __len__(self) -> int:
         return len(self._xy) // 2
 
@@ -153,6 +158,8 @@ class Moments:
         self.paths: dict[str, Path] = {name: Path() for name in ("truth", *replay.tracks)}
         self.colors = colors_of(list(replay.tracks))
         self._first_ns: int | None = None
+        self._known = T_world_map is not None
+        self._T_map_first = np.zeros(3)
         self._number, self.seconds, self.moved = -1, 0.0, 0
         self.labelled = False
         self._looked_s = -math.inf
@@ -180,6 +187,7 @@ class Moments:
         if self._first_ns is None:
             self._first_ns = frame.stamp_ns
             self.T_world_map = frame.truth if self.T_world_map is None else self.T_world_map
+        self._follow_start()
         self._number += 1
         self.labelled = self.labelled or frame.labels is not None
         self.seconds = (frame.stamp_ns - self._first_ns) / NS_PER_S
@@ -187,6 +195,9 @@ class Moments:
         if self.T_world_map is not None and frame.truth is not None:
             truth_map = se2.between(self.T_world_map, frame.truth)
         estimates = {name: track.estimates[-1] for name, track in self.replay.tracks.items()}
+        for name in estimates.keys() - {self.primary} if any(self._T_map_first) else ():
+            pose = se2.compose(self._T_map_first, estimates[name].T_map_robot)
+            estimates[name] = replace(estimates[name], T_map_robot=pose)
         for name, estimate in estimates.items():
             self.paths[name].add(estimate.T_map_robot)
         self.paths["truth"].add(np.full(3, np.nan) if truth_map is None else truth_map)
@@ -217,6 +228,17 @@ class Moments:
             self._looked_s = self.seconds
             self._map = small_map(self.track), self.track.landmarks()
         return self._map
+
+    def _follow_start(self) -> None:
+        """Once a session has found where its first frame is in the map, so is all else."""
+        T_map_first = getattr(self.track.system, "T_map_first", self._T_map_first)
+        if self._known or not any(T_map_first - self._T_map_first):
+            return
+        self._T_map_first = T_map_first
+        if self.T_world_map is not None:
+            self.T_world_map = se2.compose(self.T_world_map, se2.inverse(T_map_first))
+        for name in self.paths.keys() - {self.primary}:
+            self.paths[name].move(T_map_first)
 
     def _follow_map(self) -> None:
         """Lay out the path again where closed loops have moved the map (docs/loops.md)."""

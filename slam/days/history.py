@@ -9,6 +9,7 @@ learnt it.
 import math
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass, replace
+from datetime import UTC, datetime
 from pathlib import Path
 from typing import Any
 
@@ -29,6 +30,7 @@ FARTHEST = 1 << 24  # places from the origin
 WIDEST = 1 << 26  # places in the rectangle around all, which is held whole: 820 m square of 10 cm
 MOST_SESSIONS, MOST_TIME_S = 1000, 1e12
 DAY_S = 86_400.0
+DATES = 1971  # year from which on a time is a date: those of simulated sessions begin at 0 s
 SESSIONS = 64  # kept in a map file; older ones go; set by hand
 STOOD = 0.5  # share of the looks, when last seen: something stood; set by hand
 EMPTY = 0.05  # share of the looks, around it too: nothing stood; set by hand
@@ -52,15 +54,19 @@ class History:
     def with_session(self, snapshot: Snapshot, most: int = SESSIONS) -> "History":
         """One more; of more than ``most`` the oldest go.
 
-        Raises ``InvalidValueError`` for one that is not later than the last: the same session
-        merged twice would count twice.
+        Raises as ``check_later``.
         """
-        if self.sessions and snapshot.time_s <= self.sessions[-1].time_s:
-            raise InvalidValueError(
-                f"a session must begin after the last one of the map, at "
-                f"{self.sessions[-1].time_s:.15g} s, got {snapshot.time_s:.15g} s"
-            )
+        self.check_later(snapshot.time_s)
         return replace(self, sessions=(*self.sessions, snapshot)[-most:])
+
+    def check_later(self, time_s: float) -> None:
+        """``InvalidValueError`` for a session that does not begin after the last one: the same one
+        merged twice would count twice."""
+        if self.sessions and time_s <= self.sessions[-1].time_s:
+            raise InvalidValueError(
+                f"Session.time_s must be later than the map's last session, at "
+                f"{told(self.sessions[-1].time_s)}, got {told(time_s)}"
+            )
 
     @property
     def times_s(self) -> Float:
@@ -139,6 +145,15 @@ def dense(cells: Int32, values: Sequence[Float32] | Float32) -> tuple[Ints, Floa
     at = cells - low
     images[:, at[:, 1], at[:, 0]] = rows
     return low, images
+
+
+def told(time_s: float) -> str:
+    """A time as ``--at`` takes it, 2026-05-04T09:00:00Z; in s where it is no date of a log."""
+    try:
+        day = datetime.fromtimestamp(time_s, UTC)
+    except (OverflowError, ValueError, OSError):
+        return f"{time_s:.15g} s"
+    return f"{time_s:.15g} s" if day.year < DATES else day.isoformat().replace("+00:00", "Z")
 
 
 def hour_of(time_s: Float | float) -> Float:

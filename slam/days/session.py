@@ -8,6 +8,7 @@ keep(session, Path("m.npz"))
 """
 
 import math
+from collections.abc import Iterable
 from dataclasses import dataclass, replace
 from pathlib import Path
 
@@ -29,6 +30,7 @@ from slam.tracker.belief.state import State
 from slam.tracker.tracker import Tracker
 from slam.trajectory import Trajectory
 
+SEARCHING = "searching"  # ``diagnostics["state"]`` until the start is found
 OUTDATED = 0.05  # share of the returns: the map is outdated here; set by hand
 _TRACKED = ("tracking", "relocated", "blind")
 
@@ -67,14 +69,10 @@ class Session:
     ) -> None:
         if not math.isfinite(time_s):
             raise InvalidValueError(f"Session.time_s must be finite, got {time_s}")
-        if history is not None and len(history) and time_s <= history.times_s[-1]:
-            raise InvalidValueError(
-                f"Session.time_s must be later than the map's last session, at "
-                f"{history.times_s[-1]:.15g} s, got {time_s:.15g} s"
-            )
+        self.history = history or History(cell_m=CELL_M)
+        self.history.check_later(time_s)
         self.tracker, self.time_s = tracker, float(time_s)
         tracker.hold_map()  # what a session keeps of places lies in it
-        self.history = history or History(cell_m=CELL_M)
         self._found, self._new = found, found
         self.reset()
 
@@ -121,7 +119,7 @@ class Session:
         return replace(
             estimate,
             converged=False,
-            diagnostics={**estimate.diagnostics, "state": "searching"},
+            diagnostics={**estimate.diagnostics, "state": SEARCHING},
         )
 
     def _begin(self, search: StartSearch, frame: Frame, place: Float, own: Float) -> Estimate:
@@ -133,7 +131,9 @@ class Session:
             self._grid.add(earlier, se2.compose(place, pose))
         numbers = self.tracker.config.tracking.relocalise
         self.tracker.place(se2.compose(place, own), coarse(numbers))
-        return self._go_on(frame)
+        found = self._go_on(frame)
+        moved = {"correction": place.tolist()}  # so is all that was seen so far
+        return replace(found, diagnostics={**found.diagnostics, **moved})
 
     def _go_on(self, frame: Frame) -> Estimate:
         estimate = self.tracker.update(frame)
@@ -165,6 +165,15 @@ class Session:
         if self._state == State.TRACKING and self._news_share >= OUTDATED:
             found["state"] = State.OUTDATED.value
         return replace(estimate, diagnostics=found)
+
+    @property
+    def T_map_first(self) -> Float:
+        """(3,) where the first frame is in the map; zeros while it is not found."""
+        return self._T_map_own.copy()
+
+    def poses_in_map(self) -> Float:
+        """(n, 3) of all frames; in the session's own frame while its start is not found."""
+        return self.trajectory().poses
 
     @property
     def state(self) -> SessionState:
@@ -227,6 +236,11 @@ class Session:
             return
         history = self.known()
         self.tracker.save(path, history.arrays() if len(history) else None)
+
+
+def searched(estimates: Iterable[Estimate]) -> int:
+    """Scans before the start was found."""
+    return sum(one.diagnostics.get("state") == SEARCHING for one in estimates)
 
 
 def read_history(path: Path) -> History | None:

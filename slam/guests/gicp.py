@@ -13,6 +13,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from slam import se2
+from slam.errors import needed
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import (
@@ -23,7 +24,6 @@ from slam.guests.guest import (
     lifted,
     moved_on,
     nearest,
-    needed,
     stacked,
 )
 from slam.settings import Settings, number

@@ -3,18 +3,16 @@
 matchers of others take it: in space, as ranges, against which kept scans.
 """
 
-import importlib
 import math
 from abc import ABC, abstractmethod
 from collections.abc import Mapping
 from dataclasses import dataclass
-from types import ModuleType
 from typing import Any, TypeVar
 
 import numpy as np
 
 from slam import se2
-from slam.errors import InvalidValueError, MissingDependencyError
+from slam.errors import InvalidValueError
 from slam.estimate import Estimate
 from slam.frames import Float, Frame, LaserSpec, Odometry
 from slam.frontend.config import FRONTEND, FrontendConfig
@@ -114,16 +112,6 @@ class _Grain:
 
 
 _GRAIN = _Grain()
-
-
-def needed(module: str, package: str, extra: str = "guests") -> ModuleType:
-    """The guest's module; raises ``MissingDependencyError`` that says how to get it."""
-    try:
-        return importlib.import_module(module)
-    except ImportError as error:
-        raise MissingDependencyError(
-            f"'{package}' cannot be imported ({error}): pip install 'mobilia[{extra}]'"
-        ) from error
 
 
 def configured(kind: type[S], given: S | Mapping[str, Any] | None) -> S:

@@ -14,6 +14,7 @@ from typing import Any, ClassVar
 import numpy as np
 
 from slam import se2
+from slam.errors import needed
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
 from slam.guests.guest import (
@@ -24,7 +25,6 @@ from slam.guests.guest import (
     configured,
     moved_on,
     nearest,
-    needed,
     ranges_of,
 )
 from slam.settings import Settings, number

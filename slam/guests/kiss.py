@@ -12,9 +12,10 @@ from typing import Any, ClassVar
 
 import numpy as np
 
+from slam.errors import needed
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import Guest, configured, flattened, lifted, needed, voxel_m
+from slam.guests.guest import Guest, configured, flattened, lifted, voxel_m
 from slam.settings import Settings, number
 
 OF_PACKAGE = "its package"

@@ -13,9 +13,10 @@ from typing import Any
 import numpy as np
 
 from slam import se2
+from slam.errors import needed
 from slam.frames import Float, LaserSpec
 from slam.frontend.odometry_prior import Prediction
-from slam.guests.guest import KEEP_M, NOTHING_M, Guest, check_beams, moved_on, needed, ranges_of
+from slam.guests.guest import KEEP_M, NOTHING_M, Guest, check_beams, moved_on, ranges_of
 from slam.trajectory import Trajectory
 
 BUFFER = 20  # latest vertices matched against

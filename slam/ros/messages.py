@@ -11,14 +11,13 @@ That is exact for a turn. For a whole interlaced scan it misleads, as that drive
 neighbours are a mirror turn apart. Hence ``/scan_turn``.
 """
 
-import math
 from typing import NamedTuple
 
 import numpy as np
 
 from slam.estimate import Raster
 from slam.frames import NS_PER_S, Float, LaserSpec, Odometry, Scan
-from slam.laser_scan import is_clockwise
+from slam.laser_scan import is_clockwise, time_increment
 from slam.logs.ros_numbers import quaternion_of
 from slam.ros.template import Marks, Template, header, marked_time, message
 
@@ -124,7 +123,7 @@ class ScanMessage:
             angle_min=start,
             angle_max=start + (n - 1) * increment,
             angle_increment=increment,
-            time_increment=scan_time / math.tau * abs(increment),
+            time_increment=time_increment(scan_time, increment),
             scan_time=scan_time,
             range_min=spec.range_min,
             range_max=spec.range_max,

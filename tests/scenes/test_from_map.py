@@ -2,6 +2,7 @@
 """From a map to a plan: walls, gaps, things and floor are where the map has them."""
 
 import math
+import sys
 from dataclasses import replace
 
 import numpy as np
@@ -103,13 +104,16 @@ def test_rooms_and_spots_lie_on_free_floor_also_of_a_turned_map():
     assert made.figures.rooms_m2 > 0.7 * WIDE * HIGH
 
 
-def test_a_floor_that_ends_without_a_wall_is_shut_off(tmp_path):
+def test_a_floor_that_ends_without_a_wall_is_shut_off(tmp_path, monkeypatch):
     made = plan(two_rooms(math.radians(15.0), hole=True))
     assert 2.0 * made.ends[:, 2].sum() == pytest.approx(30 * CELL, rel=0.3)
     assert list(problems(scenes.build(str(write(made, tmp_path / "lab"))))) == []
     bare = write(replace(made, ends=made.ends[:0]), tmp_path / "bare")
     assert "gap to nowhere: 1.4 m wide" in " ".join(problems(scenes.build(str(bare))))
     assert len(plan(two_rooms()).ends) == 0
+    monkeypatch.setattr(sys.modules[plan.__module__], "MOST_WALLS", len(made.walls))
+    with pytest.raises(InvalidValueError, match=f"in {len(made.walls) + len(made.ends)} pieces"):
+        plan(two_rooms(math.radians(15.0), hole=True))
 
 
 def test_what_a_robot_drove_through_is_no_thing():

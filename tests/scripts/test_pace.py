@@ -6,10 +6,13 @@ import pytest
 from scripts import pace
 from scripts.pace import Work
 
+SLOWER = pace.slower
+
 
 @pytest.fixture(autouse=True)
 def cache(tmp_path, monkeypatch):
     monkeypatch.setenv("XDG_CACHE_HOME", str(tmp_path / "cache"))
+    monkeypatch.setattr(pace, "slower", lambda processes: 1.0)
 
 
 def test_what_ran_before_tells_how_long_it_takes(capsys):
@@ -30,6 +33,19 @@ def test_what_ran_before_tells_how_long_it_takes(capsys):
     pace.learn([(Work("run b", 1.0), 1.0), (Work("run c", 1.0), 9.0)])
     assert pace.estimate([Work("run d", 1.0)]) == pytest.approx(1.6)
     assert pace.estimate([]) == 0.0
+
+
+def test_a_busy_machine_takes_longer(tmp_path, monkeypatch, capsys):
+    monkeypatch.setattr("os.cpu_count", lambda: 2)
+    for text, times in (("3.00 1 1 6/99 7", 2.0), ("3.00 1 1 1/99 7", 1.0), ("", 1.0)):
+        (tmp_path / "loadavg").write_text(text)
+        assert SLOWER(1, tmp_path / "loadavg") == times
+    assert SLOWER(1, tmp_path / "none") == 1.0
+    monkeypatch.setattr(pace, "slower", lambda processes: 2.0)
+    pace.learn([(Work("run a"), 20.0)])
+    assert pace.estimate([Work("run a")]) == 10.0  # alone
+    pace.announce("a run", [Work("run a")])
+    assert capsys.readouterr().out == "Ahead: a run; about 20 s beside what else runs here.\n"
 
 
 @pytest.mark.parametrize("text", ["", "[]", "{", '{"run a": "x"}', '{"run a": Infinity}', "\x00"])

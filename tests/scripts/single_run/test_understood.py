@@ -13,6 +13,7 @@ import tests.slam.logs.foreign_bags as bags
 from scripts import cli
 from scripts.film.footage import Footage, of_log
 from scripts.single_run import log_words
+from slam.days.session import SEARCHING
 from slam.errors import InvalidValueError
 from tests.world2d import World2D, frames, laser, office, office_loop
 
@@ -102,10 +103,14 @@ def test_a_run_that_nobody_trusts_names_the_likeliest_cause_first(without: Path)
     found = test.told()
 
     def track(doubted: int) -> Any:
-        estimates = [SimpleNamespace(converged=k >= doubted) for k in range(10)]
+        estimates = [SimpleNamespace(converged=k >= doubted, diagnostics={}) for k in range(10)]
         return SimpleNamespace(name="mine", estimates=estimates)
 
     assert log_words.distrust(track(3), footage, found) == ""
+    started = track(4)
+    for one in started.estimates[:3]:
+        one.diagnostics["state"] = SEARCHING
+    assert log_words.distrust(started, footage, found) == ""
     words = log_words.distrust(track(4), footage, found)
     assert words.startswith("mine did not trust 40% of its scans. Likely causes, in order: the sc")
     assert np.all([word in words for word in ("different clocks", "wheels that slip")])
@@ -125,7 +130,8 @@ def test_ranges_in_mm_are_told_and_named_first(tmp_path: Path, limit: float) -> 
         out += [make.odometry(at, (0, 0, 0)), make.scan(at, ranges, range_max=limit)]
     footage = of_log(bags.write_ros2(tmp_path / "mm", out))
     assert log_words.units(footage).startswith("ranges look like mm: the median is 2500")
-    doubted = SimpleNamespace(name="mine", estimates=[SimpleNamespace(converged=False)])
+    estimate = SimpleNamespace(converged=False, diagnostics={})
+    doubted = SimpleNamespace(name="mine", estimates=[estimate])
     assert "in order: ranges look like mm" in log_words.distrust(doubted, footage, [])  # type: ignore[arg-type]
 
 

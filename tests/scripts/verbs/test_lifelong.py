@@ -3,15 +3,18 @@
 
 import csv
 import json
+from types import SimpleNamespace
 
 import numpy as np
 import pytest
 
-from scripts.single_run.run import Maps, session_of
+from scripts.single_run.run import Maps, SessionTrack, session_of
 from slam.days.evidence import Snapshot
 from slam.days.history import History
 from slam.errors import InvalidValueError
 from slam.frames import Stream, StreamMetadata
+from slam.shunting import ShuntingSlam
+from slam.trajectory import Trajectory
 
 pytestmark = pytest.mark.slow
 
@@ -39,8 +42,21 @@ def test_a_session_that_is_not_later_than_the_map_is_asked_for_its_time(monkeypa
     stream = Stream(
         metadata=StreamMetadata(source="test", extra={"epoch_ns": 5_000_000_000}), frames=list
     )
-    with pytest.raises(InvalidValueError, match=r"begins at 5 s.*at 5 s: say when.*--at 2026-"):
+    monkeypatch.setattr(ShuntingSlam, "load", lambda _: ShuntingSlam())
+    monkeypatch.setattr("slam.days.session.read_history", lambda _: history)
+    with pytest.raises(InvalidValueError, match=r"later than the map's last .*at 5 s, got 5 s"):
         session_of("shunting", Maps(map_in=tmp_path / "m.npz"), stream)
+
+
+def test_a_session_that_found_its_start_is_one_path_from_it():
+    T_map_first = np.array([3.0, 1.0, 0.5 * np.pi])
+    in_map = np.array([T_map_first, [3.0, 2.0, 0.5 * np.pi], [2.0, 2.0, np.pi]])
+    path = Trajectory(stamps_ns=np.arange(3), poses=in_map)
+    session = SimpleNamespace(T_map_first=T_map_first, trajectory=lambda: path)
+    track = SessionTrack("shunting", session)
+    wanted = [[0.0, 0.0, 0.0], [1.0, 0.0, 0.0], [1.0, 1.0, 0.5 * np.pi]]
+    np.testing.assert_allclose(track.online().poses, wanted, atol=1e-12)
+    assert track.final() is None
 
 
 def test_a_small_building_is_lived_in(called, tmp_path):

@@ -10,6 +10,8 @@ pytestmark = pytest.mark.slow
 WITHOUT_OUT = ("bench", "config", "live", "render", "report")
 
 WRONG = [
+    ("--foo", "No such option: --foo. What there is: mobilia --help"),
+    ("nosuch", "No such command 'nosuch'. What there is: mobilia --help"),
     ("demo --scene ofice", "Did you mean 'office'"),
     ("demo --dynamism 2", "dynamism must be a number from 0 to 1, got 2.0"),
     ("demo --seconds -3", "--seconds must be > 0 and finite, got -3.0"),

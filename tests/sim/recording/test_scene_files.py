@@ -7,10 +7,11 @@ import pytest
 
 from scenes.scene_file import files, sha256_of
 from scripts.comparison.plan import Plan
+from sim.gym import offline
 from sim.recording.recipe import Recipe, read_recipe, write_recipe
 from sim.simulation import Simulation
 from sim.world.robots import FOLDER
-from slam.errors import LogFormatError
+from slam.errors import LogFormatError, MissingPathError
 from slam.names import NameFromFile
 
 pytestmark = pytest.mark.slow
@@ -42,6 +43,29 @@ def test_an_edited_file_is_noticed_by_both_hashes(lab: Path, name: str) -> None:
         LogFormatError, match=f"then {recipe.scene_sha256}, now {sha256_of(str(lab))}"
     ):
         Simulation(**again.simulation())
+
+
+def test_a_scene_is_found_above_its_result(lab: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.chdir(lab.parent)
+    (lab.parent / "run").mkdir()
+    file = lab.parent / "run" / "recipe.json"
+    write_recipe(file, Recipe(scene="lab.toml", seed=1, dynamism=0.0, seconds=1.0), {})
+    monkeypatch.chdir("/")
+    again = read_recipe(file).recipe
+    assert Path(again.simulation()["scene"]).samefile(lab)
+    assert again.scene == "lab.toml"
+    lab.unlink()
+    with pytest.raises(MissingPathError, match=r"^lab\.toml: no such file here or above .*recipe"):
+        again.simulation()
+
+
+def test_a_dataset_tells_no_path_of_this_machine(lab: Path) -> None:
+    pytest.importorskip("minari")
+    recipe = Recipe(scene=str(lab), seed=1, dynamism=0.0, seconds=1.0)
+    offline.write(lab.parent / "set", recipe.name, recipe, [])
+    told = (lab.parent / "set" / "data" / "metadata.json").read_text()
+    assert "lab.toml" in told
+    assert lab.parent.name not in told
 
 
 def test_a_comparison_keeps_the_hash_of_its_scenes(lab: Path) -> None:

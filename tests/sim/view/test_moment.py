@@ -1,11 +1,14 @@
 # SPDX-License-Identifier: Apache-2.0
 """What is told of a moment: the claim by its own covariance, the error beside it, no green lie."""
 
+from types import SimpleNamespace
+
 import numpy as np
 import pytest
 
 from sim.view.draw import AMBER, GREEN, INK, RED
-from sim.view.moment import Shown
+from sim.view.moment import Moments, Shown
+from slam import se2
 from slam.estimate import Estimate
 
 
@@ -40,3 +43,24 @@ def shown(sigma_m, off_m=None, heading_rad=0.01, converged=True, **diagnostics) 
 )  # fmt: skip
 def test_a_pose_is_green_only_where_it_claims_to_be_known_and_the_truth_agrees(moment, claim, off):
     assert moment.told() == [claim, *([] if off is None else [off])]
+
+
+def test_all_lies_in_the_map_once_a_session_has_found_where_it_began_there():
+    place, truth = np.array([3.0, 1.0, 0.5 * np.pi]), np.array([9.0, 9.0, np.pi])
+    system = SimpleNamespace(T_map_first=np.zeros(3))
+    tracks = {name: SimpleNamespace(system=system, estimates=[]) for name in ("it", "odometry")}
+    moments = Moments(SimpleNamespace(tracks=tracks))
+    for k in range(3):
+        step = np.array([float(k), 0.0, 0.0])
+        found = k == 2
+        system.T_map_first = place if found else np.zeros(3)
+        for name, track in tracks.items():
+            pose = se2.compose(place, step) if found and name == "it" else step
+            track.estimates.append(Estimate(stamp_ns=k, T_map_robot=pose, covariance=np.eye(3)))
+        there = se2.compose(truth, step)
+        last = moments.note(SimpleNamespace(stamp_ns=k, truth=there, labels=None))
+    np.testing.assert_allclose(last.error("it"), (0.0, 0.0), atol=1e-12)
+    np.testing.assert_allclose(last.error("odometry"), (0.0, 0.0), atol=1e-12)
+    way = [[3.0, 1.0], [3.0, 2.0], [3.0, 3.0]]
+    for name in ("truth", "odometry"):
+        np.testing.assert_allclose(moments.paths[name].points(), way, atol=1e-12)

@@ -9,7 +9,7 @@ import pytest
 from slam.days.changes import between
 from slam.days.evidence import SessionGrid, Snapshot
 from slam.days.habits import MobilityMap
-from slam.days.history import History
+from slam.days.history import History, told
 from slam.errors import InvalidValueError
 from tests.world2d import Drive, World2D, frames, rectangle
 
@@ -134,8 +134,22 @@ def test_a_history_keeps_its_newest_sessions_in_order():
         session = Snapshot(time_s=time_s, cells=part.cells, standing=part.standing)
         history = history.with_session(session, most=2)
     np.testing.assert_array_equal(history.times_s, [2.0, 3.0])
-    with pytest.raises(InvalidValueError, match="must begin after the last"):
+    with pytest.raises(InvalidValueError, match="later than the map's last session"):
         history.with_session(session)
+
+
+@pytest.mark.parametrize(
+    ("time_s", "words"),
+    [
+        (1777885200.0, "2026-05-04T09:00:00Z"),
+        (1777885200.25, "2026-05-04T09:00:00.250000Z"),
+        (118800.0, "118800 s"),  # simulated
+        (-5.0, "-5 s"),
+        (1e12, "1000000000000 s"),  # no such year
+    ],
+)
+def test_a_time_is_said_as_a_date_where_it_is_one(time_s: float, words: str):
+    assert told(time_s) == words
 
 
 def test_mobility_is_how_much_a_place_differs_from_one_sighting_to_the_next():

@@ -11,7 +11,7 @@ from slam.days.evidence import Snapshot
 from slam.days.habits import DaysRaster
 from slam.days.history import DAY_S, History
 from slam.days.search import FITS, SPOILS
-from slam.days.session import Session, keep, read_history
+from slam.days.session import Session, keep, read_history, searched
 from slam.errors import InvalidValueError, LogFormatError
 from slam.shunting import ShuntingConfig, ShuntingSlam
 from slam.tracker import map_file
@@ -58,6 +58,9 @@ def test_the_next_day_begins_anywhere_and_is_merged(first, tmp_path) -> None:
     assert not any(e.converged for e, s in zip(estimates, searching, strict=True) if s)
     np.testing.assert_allclose(estimates[-1].T_map_robot, truth[-1], atol=0.05)
     np.testing.assert_allclose(session.trajectory().poses, truth, atol=0.08)
+    np.testing.assert_allclose(session.T_map_first, truth[0], atol=0.08)
+    moved = [any(e.diagnostics["correction"]) for e in estimates]
+    assert moved.index(True) == searched(estimates) == sum(searching)
     assert keep(session, path) == path
     history = read_history(path)
     assert history is not None

@@ -200,7 +200,8 @@ def test_a_guest_that_ends_nowhere_has_lost_the_run(stream: list[Frame]) -> None
     failure = track.survive(stream)
     assert isinstance(failure, SlamFailedError)
     assert "scan 3" in str(failure)
-    assert "nan" in str(failure)
+    assert "got [nan" in str(failure)
+    assert f"(test_guests.py:{Failing.locate.__code__.co_firstlineno})" in str(failure)
     assert len(track.estimates) == 3
     assert Track("odometry", create("odometry")).survive(stream) is None
 
