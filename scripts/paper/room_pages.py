@@ -26,7 +26,7 @@ def run_all(
     report: Report, plan: Plan, scene: str, dynamism: float, variants: Mapping[str, dict[str, Any]]
 ) -> dict[str, list[Run]]:
     """Every variant (name -> options of the scene) over all seeds."""
-    seconds = 4.0 if plan.quick else SECONDS
+    seconds = 8.0 if plan.quick else SECONDS
     seeds = plan.seed_list()
     cases = {(v, seed): f"{v}-seed-{seed}" for v in variants for seed in seeds}
     room = {"scene": scene, "dynamism": dynamism, "seconds": seconds}

@@ -21,7 +21,7 @@ pytestmark = pytest.mark.slow
 DT = 0.025
 
 
-def write_park(folder: Path, duration_s: float = 24.0) -> None:
+def write_park(folder: Path, duration_s: float = 36.0) -> None:
     """A truck that circles among trees: detections, GPS, and the graph of what was seen."""
     rng = np.random.default_rng(1)
     times = 10.0 + DT * np.arange(round(duration_s / DT) + 1)
