@@ -297,7 +297,7 @@ def test_a_dask_cluster_that_loses_a_worker_makes_the_same_bytes(serial, tmp_pat
 
 
 def test_a_scheduler_of_dask_that_dies_is_one_line_and_the_command_goes_on(tmp_path):
-    words = ["generate", "arena", "--seconds", "20", "--episodes", "6"]
+    words = ["generate", "arena", "--seconds", "8", "--episodes", "6"]
     command = [sys.executable, "-m", "scripts", *words, "--out", str(tmp_path / "out")]
     with dask_cluster(tmp_path) as (address, parts):
         begun = subprocess.Popen(
