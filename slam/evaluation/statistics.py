@@ -70,7 +70,7 @@ def bootstrap_draws(n: int) -> NDArray[np.int64]:
 
 
 def drawn_medians(
-    values: Sequence[float], draws: NDArray[np.int64], owners: Sequence[int] | None = None
+    values: Sequence[float], draws: NDArray[np.int64], owners: NDArray[np.intp] | None = None
 ) -> NDArray[np.float64]:
     """(RESAMPLES,) medians of the values drawn, as ``quantile`` gives them.
 
@@ -80,13 +80,13 @@ def drawn_medians(
     times = np.bincount((draws + n * np.arange(rows)[:, None]).ravel(), minlength=rows * n)
     order = np.argsort(values)
     ranked = np.asarray(values, dtype=np.float64)[order]
-    owned = order if owners is None else np.asarray(owners)[order]
+    owned = order if owners is None else owners[order]
     upto = np.cumsum(times.reshape(rows, n)[:, owned], axis=1)  # so many drawn, up to each value
     drawn = upto[:, -1:]
     low, high = (ranked[(upto <= at).sum(axis=1)] for at in ((drawn - 1) // 2, drawn // 2))
     with np.errstate(invalid="ignore"):
         both = low + high
-        medians = np.where(np.isinf(both), both, low + 0.5 * (high - low))
+        medians: NDArray[np.float64] = np.where(np.isinf(both), both, low + 0.5 * (high - low))
     medians[np.isnan(both)] = 0.0  # as in _between
     return medians
 
