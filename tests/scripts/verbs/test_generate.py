@@ -76,8 +76,15 @@ def flip(path: Path, at: float = 0.5) -> None:
 
 def test_killed_in_mid_episode_and_started_again_ends_with_the_same_bytes(serial, tmp_path):
     out = tmp_path / "data"
-    code = (
-        "from pathlib import Path; from scripts.verbs.generate import Generate\n"
+    code = (  # which stops in the second episode, to be killed there
+        "import time; from pathlib import Path; from scripts.verbs.generate import Generate\n"
+        "from sim.recording.bag import BagWriter\n"
+        "write, stamps = BagWriter.write, []\n"
+        "def writes(bag, moment):\n"
+        "    stamps.append(moment.frame.stamp_ns)\n"
+        "    time.sleep(300.0 if stamps.count(stamps[0]) == 2 and len(stamps) % 10 == 0 else 0.0)\n"
+        "    write(bag, moment)\n"
+        "BagWriter.write = writes\n"
         f"Generate(scene=['arena'], out=Path({str(out)!r}), **{SETTINGS})()"
     )
     child = subprocess.Popen([sys.executable, "-c", code], env=environment())
