@@ -11,6 +11,7 @@ import argparse
 import json
 import sys
 from collections.abc import Mapping, Sequence
+from functools import lru_cache
 from pathlib import Path
 from typing import Any
 
@@ -53,6 +54,7 @@ def tracks_table(tracks: Sequence[Track]) -> str:
     return table(heads, rows, left=4)
 
 
+@lru_cache(1)
 def board_of(of: Results) -> Board:
     """What ships, as a board."""
     runs = {track.name: of.rows(track.name) for track in tracks_of(of)}

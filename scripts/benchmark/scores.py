@@ -14,7 +14,12 @@ from scripts.benchmark.tracks import Track
 from scripts.comparison.schema import FAILED
 from scripts.comparison.tables import number
 from slam.evaluation.lost import LOST_M
-from slam.evaluation.statistics import bootstrap_draws, central_interval, quantile
+from slam.evaluation.statistics import (
+    bootstrap_draws,
+    central_interval,
+    drawn_medians,
+    quantile,
+)
 from slam.frames import Float
 
 Row = dict[str, Any]
@@ -80,15 +85,11 @@ def by_seed_interval(values: Sequence[tuple[int, float]]) -> tuple[float, float]
 
     The runs of a seed are the same room at every level, so they are no samples of their own.
     """
-    by_seed: dict[int, list[float]] = {}
-    for seed, value in values:
-        by_seed.setdefault(seed, []).append(value)
-    groups = [by_seed[seed] for seed in sorted(by_seed)]
-    n = len(groups)
-    if n < 2:
+    seeds, owners = np.unique([seed for seed, _ in values], return_inverse=True)
+    if len(seeds) < 2:
         return math.nan, math.nan
-    draws = bootstrap_draws(n).tolist()
-    return central_interval([quantile([v for k in draw for v in groups[k]], 0.5) for draw in draws])
+    draws = bootstrap_draws(len(seeds))
+    return central_interval(drawn_medians([v for _, v in values], draws, owners).tolist())
 
 
 def by_level(rows: Sequence[Row], metric: str) -> dict[float, float]:

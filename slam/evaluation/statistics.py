@@ -43,7 +43,7 @@ def median_interval(values: Sequence[float]) -> tuple[float, float]:
     """Percentile-bootstrap 95 % interval of the median, infinite values allowed."""
     if not values:
         return math.nan, math.nan
-    return central_interval(_drawn_medians(values, bootstrap_draws(len(values))).tolist())
+    return central_interval(drawn_medians(values, bootstrap_draws(len(values))).tolist())
 
 
 def ratio_interval(before: Sequence[float], after: Sequence[float]) -> tuple[float, float]:
@@ -59,7 +59,7 @@ def ratio_interval(before: Sequence[float], after: Sequence[float]) -> tuple[flo
         return math.nan, math.nan
     draws = bootstrap_draws(len(before))
     with np.errstate(divide="ignore", invalid="ignore"):
-        ratios = _drawn_medians(after, draws) / _drawn_medians(before, draws)
+        ratios = drawn_medians(after, draws) / drawn_medians(before, draws)
     ratios[np.isnan(ratios)] = 1.0
     return central_interval(ratios.tolist())
 
@@ -69,14 +69,25 @@ def bootstrap_draws(n: int) -> NDArray[np.int64]:
     return np.random.default_rng(SEED).integers(0, n, (RESAMPLES, n))
 
 
-def _drawn_medians(values: Sequence[float], draws: NDArray[np.int64]) -> NDArray[np.float64]:
-    """(RESAMPLES,) medians of the values drawn."""
-    n = len(values)
-    ranked = np.sort(np.array(values, dtype=np.float64)[draws], axis=1)
-    low, high = ranked[:, (n - 1) // 2], ranked[:, n // 2]
+def drawn_medians(
+    values: Sequence[float], draws: NDArray[np.int64], owners: NDArray[np.intp] | None = None
+) -> NDArray[np.float64]:
+    """(RESAMPLES,) medians of the values drawn, as ``quantile`` gives them.
+
+    owners  (n,) which of the things drawn each value is of; else each is one of its own
+    """
+    rows, n = draws.shape
+    times = np.bincount((draws + n * np.arange(rows)[:, None]).ravel(), minlength=rows * n)
+    order = np.argsort(values)
+    ranked = np.asarray(values, dtype=np.float64)[order]
+    owned = order if owners is None else owners[order]
+    upto = np.cumsum(times.reshape(rows, n)[:, owned], axis=1)  # so many drawn, up to each value
+    drawn = upto[:, -1:]
+    low, high = (ranked[(upto <= at).sum(axis=1)] for at in ((drawn - 1) // 2, drawn // 2))
     with np.errstate(invalid="ignore"):
-        medians = np.where(np.isinf(low + high), low + high, low + 0.5 * (high - low))
-    medians[np.isnan(low + high)] = 0.0  # as in _between
+        both = low + high
+        medians: NDArray[np.float64] = np.where(np.isinf(both), both, low + 0.5 * (high - low))
+    medians[np.isnan(both)] = 0.0  # as in _between
     return medians
 
 

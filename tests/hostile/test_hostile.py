@@ -265,7 +265,7 @@ def test_a_typed_module_is_found_in_the_working_folder_by_guests_too(hostile: Ho
         (hostile.path / f"{name}.py").unlink()
     done = in_process(
         hostile, "compare", "--slam", SLAM, "odometry", "--scene", "arena", "--dynamism", "0.5",
-        "--seeds", "1", "--seconds", "0.5", "--out", "compared",
+        "--seeds", "1", "--seconds", "0.5", "--jobs", "1", "--out", "compared",
     )  # fmt: skip
     assert done.returncode == 0, done.stderr
     assert "finished" in (hostile.path / "compared" / "runs.csv").read_text()

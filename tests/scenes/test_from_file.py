@@ -167,7 +167,7 @@ BOX = "walls = [[[0, 0], [8, 0], [8, 5], [0, 5], [0, 0]]]\nstart = [1, 1, 0]\n"
         (BOX.replace("8, 0", "9000, 0").replace("8, 5", "9000, 9000"), "at most 60000 m2"),
         (f"walls = [[{'[0, 0], [8, 0], ' * 6000}[8, 5]]]\n", "walls.* of 2 to 5000 values"),
         (f"walls = [{('[' + '[0, 0], [8, 5], ' * 2000 + '], ') * 4}]\n", "at most 10000 boxes"),
-        (BOX + "put = [" + '["desk", 4, 3, 0], ' * 1100 + "]", "at most 1000 pieces of furniture"),
+        (BOX + "put = [" + '["desk", 4, 3, 0], ' * 31 + "]", "at most 30 pieces of furniture"),
         (BOX + "put = [" + '["bin", 4, 3, 0], ' * 2 + "]", r"'bin1' at \(4, 3\) stands in 'bin0'"),
         ("walls = []", "walls must be one polyline or more"),
         ('plan = "/etc/shed.xml"', "'/etc/shed.xml', expected one beside it"),
@@ -177,7 +177,10 @@ BOX = "walls = [[[0, 0], [8, 0], [8, 5], [0, 5], [0, 0]]]\nstart = [1, 1, 0]\n"
         ('plan = "loop.xml"', "beside it|cannot be read"),
     ],
 )  # fmt: skip
-def test_values_and_paths_that_cannot_be_are_told_in_one_line(lab, tmp_path, text, says):
+def test_values_and_paths_that_cannot_be_are_told_in_one_line(
+    lab, tmp_path, text, says, monkeypatch
+):
+    monkeypatch.setattr("scenes.assembly.MOST_PARTS", 30)
     inside = tmp_path / "in"
     inside.mkdir()
     (tmp_path / "shed.xml").write_text(SHED)

@@ -2,48 +2,42 @@
 """What needs no simulator, compiler or figure loads none: lists, help and typing errors."""
 
 import importlib
+from types import SimpleNamespace
 
 import pytest
 
 from scenes import registry
 from slam import system
-from tests.processes import python
+from tests.processes import mobilia_each
 
 pytestmark = pytest.mark.slow
 SLOW = ("mujoco", "numba", "matplotlib", "scipy", "cv2", "rosbags", "joblib")
-_PROBE = """
-import sys
-from scripts.__main__ import main
-sys.argv = ["mobilia", *sys.argv[1:]]
-try:
-    main()
-except SystemExit as ended:
-    print(f"ended with {ended.code}")
-print("loaded:", *sorted({name.partition(".")[0] for name in sys.modules}))
-"""
+SAID = {
+    "list": "random-rooms",
+    "--help": "sensor-card",
+    "blame --help": "--horizon",
+    "tune --help": "--space",
+    "rnu": "Did you mean 'run'",
+    "run --sene arena": "No such option: --sene",
+    "run shuntin --scene arena": "Did you mean 'shunting'",
+    "run ekf --scene aren": "Did you mean 'arena'",
+    "compare --slam shunting{a=1 --out x": "'{' without '}'",
+}
 
 
-@pytest.mark.parametrize(
-    ("words", "said"),
-    [
-        ("list", "random-rooms"),
-        ("--help", "sensor-card"),
-        ("blame --help", "--horizon"),
-        ("tune --help", "--space"),
-        ("rnu", "Did you mean 'run'"),
-        ("run --sene arena", "No such option: --sene"),
-        ("run shuntin --scene arena", "Did you mean 'shunting'"),
-        ("run ekf --scene aren", "Did you mean 'arena'"),
-        ("compare --slam shunting{a=1 --out x", "'{' without '}'"),
-    ],
-)
-def test_what_simulates_nothing_loads_no_simulator(words, said, tmp_path):
-    ran = python("-c", _PROBE, *words.split(), cwd=tmp_path)
-    answer, _, loaded = ran.stdout.rpartition("loaded:")
-    assert said in answer + ran.stderr
-    assert "ended with" in answer
-    assert not set(SLOW) & set(loaded.split())
-    assert not any(tmp_path.iterdir())
+@pytest.fixture(scope="module")
+def answers(tmp_path_factory) -> dict[str, SimpleNamespace]:
+    here = tmp_path_factory.mktemp("here")
+    found = mobilia_each([*SAID], here)
+    assert not any(here.iterdir())
+    return found
+
+
+@pytest.mark.parametrize("words", SAID)
+def test_what_simulates_nothing_loads_no_simulator(words, answers):
+    answer = answers[words]
+    assert SAID[words] in answer.stdout + answer.stderr
+    assert not set(SLOW) & set(answer.loaded)
 
 
 def test_what_a_list_says_of_a_name_is_what_its_docstring_says():

@@ -5,7 +5,6 @@ import hashlib
 import logging
 import os
 import pickle
-import subprocess
 import sys
 from pathlib import Path
 
@@ -17,36 +16,39 @@ from slam._jit import announced, inner, uncounted
 from tests.processes import python
 
 pytestmark = pytest.mark.slow
-CALLEE = """
-from slam._jit import {} as jit
-@jit
-def inner(x):
+KERNEL = """
+from slam._jit import inner, njit
+{}
+@{}
+def called(x):
     return x + {}
 """
 CALLER = """
 from slam._jit import njit
-from callee import inner
+from {} import called
 @njit
 def outer(x):
-    return inner(x)
-print(outer(1.0))
+    return called(x)
 """
 
 
-def run(folder: Path, decorator: str, step: float, callee: str = CALLEE) -> float:
-    (folder / "callee.py").write_text(callee.format(decorator, step))
-    here = Path(__file__).parents[2]
-    env = {**os.environ, "PYTHONPATH": f"{here}{os.pathsep}{folder}"}
-    env["NUMBA_CACHE_DIR"] = str(folder / "cache")
-    env["PYTHONDONTWRITEBYTECODE"] = "1"
-    done = subprocess.run(
-        [sys.executable, str(folder / "caller.py")],
-        capture_output=True,
-        text=True,
-        check=True,
-        env=env,
-    )
-    return float(done.stdout)
+def run(folder: Path, step: float, constant: float) -> list[float]:
+    """What kernels say that call one of another module: two of a step, two of a constant."""
+    kernels = {
+        "compiled": KERNEL.format("", "njit", step),
+        "within": KERNEL.format("", "inner", step),
+        "named": KERNEL.format("from numbers_of import STEP", "njit", "STEP"),
+        "dotted": KERNEL.format("import numbers_of", "njit", "numbers_of.STEP"),
+    }
+    (folder / "numbers_of.py").write_text(f"STEP = {constant}\n")
+    for name, text in kernels.items():
+        (folder / f"{name}.py").write_text(text)
+        (folder / f"calls_{name}.py").write_text(CALLER.format(name))
+    code = "".join(f"import calls_{name}; print(calls_{name}.outer(1.0))\n" for name in kernels)
+    path = f"{Path(__file__).parents[2]}{os.pathsep}{folder}"
+    done = python("-c", code, PYTHONPATH=path, PYTHONDONTWRITEBYTECODE="1",
+                  NUMBA_CACHE_DIR=str(folder / "cache"))  # fmt: skip
+    return [float(line) for line in done.stdout.splitlines()]
 
 
 def test_a_kernel_that_counts_no_references_may_neither_allocate_nor_return_an_array():
@@ -70,37 +72,28 @@ def test_a_kernel_that_counts_no_references_leaves_its_arguments_alone():
     assert [sys.getrefcount(table) for table in tables] == before
 
 
-@pytest.mark.parametrize("decorator", ["njit", "inner"])
-def test_a_changed_callee_of_another_module_is_compiled_anew(tmp_path, decorator):
-    (tmp_path / "caller.py").write_text(CALLER)
-    assert run(tmp_path, decorator, 1.0) == 2.0
-    assert run(tmp_path, decorator, 2.0) == 3.0
+@pytest.fixture(scope="module")
+def ran(tmp_path_factory) -> Path:
+    """Where all four are compiled."""
+    folder = tmp_path_factory.mktemp("kernels")
+    assert run(folder, 1.0, 1.0) == [2.0, 2.0, 2.0, 2.0]
+    return folder
 
 
-@pytest.mark.parametrize(
-    ("imported", "name"),
-    [("from numbers_of import STEP", "STEP"), ("import numbers_of", "numbers_of.STEP")],
-)
-def test_a_changed_constant_from_another_module_is_compiled_anew(tmp_path, imported, name):
-    (tmp_path / "caller.py").write_text(CALLER)
-    callee = f"from slam._jit import njit\n{imported}\n@njit\n"
-    callee += f"def inner(x):\n    return x + {name}\n"
-    for step in (1.0, 2.0):
-        (tmp_path / "numbers_of.py").write_text(f"STEP = {step}\n")
-        assert run(tmp_path, "njit", step, callee) == 1.0 + step
+def test_a_changed_callee_or_constant_of_another_module_is_compiled_anew(ran):
+    assert run(ran, 2.0, 1.0) == [3.0, 3.0, 2.0, 2.0]
+    assert run(ran, 2.0, 2.0) == [3.0, 3.0, 3.0, 3.0]
 
 
-def test_a_cache_that_names_types_which_are_gone_is_an_empty_cache(tmp_path):
+def test_a_cache_that_names_types_which_are_gone_is_an_empty_cache(ran):
     """As after an update that moved a class to another module."""
-    (tmp_path / "caller.py").write_text(CALLER)
-    run(tmp_path, "njit", 1.0)
-    indices = list((tmp_path / "cache").rglob("caller.outer*.nbi"))
+    indices = list((ran / "cache").rglob("calls_compiled.outer*.nbi"))
     assert len(indices) == 1
     with indices[0].open("rb") as file:
         version = pickle.load(file)
     gone = pickle.dumps(version) + b"cslam.errors\nGone\n."
     indices[0].write_bytes(gone + hashlib.sha256(gone).digest())
-    assert run(tmp_path, "njit", 1.0) == 2.0
+    assert run(ran, 2.0, 2.0) == [3.0, 3.0, 3.0, 3.0]
 
 
 DAMAGED = """
@@ -133,7 +126,7 @@ whole = files()
 assert len(whole) == 2
 assert sum(called().cache_hits.values()) == 1
 rng = np.random.default_rng(0)
-for k in range(110):
+for k in range(48):  # each kind to each of the two files, four times in the mean
     path = list(whole)[k % 2]
     data = bytearray(whole[path])
     kind = ("empty", "cut", "flip", "flip", "zeros", "gone")[int(rng.integers(6))]

@@ -195,7 +195,7 @@ def test_a_hundred_clients_are_told_that_eight_are_there(opened):
 
 
 def test_what_waits_for_a_client_that_does_not_read_is_bounded(opened, echo):
-    with asked(opened, max_queue=1) as client:
+    with asked(opened, max_queue=1, close_timeout=0.1) as client:
         client.send(b"flood")
         sent = [-1, 0]
         while sent[-1] != sent[-2]:  # until nothing more goes in

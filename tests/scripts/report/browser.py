@@ -22,6 +22,10 @@ SOFTWARE_GL = (
     "--use-gl=angle", "--use-angle=swiftshader", "--enable-unsafe-swiftshader",
     "--ignore-gpu-blocklist",
 )  # fmt: skip
+FRAMES = """
+window.requestAnimationFrame = draw => setTimeout(() => draw(performance.now()), 200);
+window.cancelAnimationFrame = clearTimeout;
+"""  # five a second: software GL would draw on one core as fast as it can
 LIMIT_S = 60.0
 CONNECT = """
 import os, sys
@@ -72,6 +76,8 @@ class Browser:
         self._session = attached["sessionId"]
         for domain in ("Page", "Runtime", "Log", "Network"):
             self.call(f"{domain}.enable")
+        if gl:
+            self.call("Page.addScriptToEvaluateOnNewDocument", source=FRAMES)
 
     def __enter__(self) -> "Browser":
         return self

@@ -133,7 +133,9 @@ def fuzz(inputs: int, seed: int, keep: Path | None = None, kinds: Sequence[str] 
     """Read so many variants, of the kinds in turn; what is wrong is kept in a folder."""
     found, kinds = Found(Counter(), []), kinds or tuple(READERS)
     with tempfile.TemporaryDirectory(prefix="mobilia-fuzz-") as scratch:
-        for kind in kinds:  # kernels are compiled, and modules imported, before the first fork
+        for kind in dict.fromkeys(
+            kinds
+        ):  # kernels are compiled, and modules imported, before the first fork
             READERS[kind](Path(shutil.copytree(CORPUS / kind, Path(scratch) / kind)))
         for k in range(inputs):
             kind, rng = kinds[k % len(kinds)], np.random.default_rng([seed, k])

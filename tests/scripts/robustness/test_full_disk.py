@@ -125,7 +125,7 @@ def test_tables_of_a_comparison(disk: Disk, tmp_path: Path):
 
 def test_two_processes(disk: Disk):
     place = disk(100)
-    words = ("generate", "arena", "--episodes", "2", "--seconds", "20")
+    words = ("generate", "arena", "--episodes", "2", "--seconds", "8")
     words = ("-m", "scripts", *words, "--jobs", "2", "--out", "out")
     done = python(*words, cwd=place, check=False)
     assert done.returncode == 1

@@ -32,8 +32,9 @@ sys.stdin.read()
 """
 
 
-@pytest.fixture
+@pytest.fixture(scope="module")
 def rooms():
+    """To start workers takes seconds of each; the first test finds them as they were made."""
     many = MobiliaVectorEnv(3, n_workers=2, **SHORT)
     yield many
     many.close()
@@ -66,7 +67,7 @@ def test_errors_and_objects_come_from_workers_as_from_here(rooms):
 
 
 def test_rooms_that_are_closed_say_so_with_workers_and_without():
-    for workers in (0, 2):
+    for workers in (0, 1):
         many = MobiliaVectorEnv(2, n_workers=workers, scene="arena")
         many.reset(seed=1)
         many.close()
@@ -77,7 +78,7 @@ def test_rooms_that_are_closed_say_so_with_workers_and_without():
 
 @pytest.mark.filterwarnings("ignore:.*fork:DeprecationWarning")
 def test_a_fork_that_holds_the_pipes_does_not_keep_workers():
-    many = MobiliaVectorEnv(2, n_workers=2, scene="arena")
+    many = MobiliaVectorEnv(2, n_workers=1, scene="arena")
     child = os.fork()
     if child == 0:
         time.sleep(60.0)
@@ -85,7 +86,7 @@ def test_a_fork_that_holds_the_pipes_does_not_keep_workers():
     try:
         workers = [process for process, _ in many._rooms._workers]
         many.close()
-        assert [process.returncode for process in workers] == [0, 0]  # none was killed
+        assert [process.returncode for process in workers] == [0]  # it was not killed
     finally:
         os.kill(child, signal.SIGKILL)
         os.waitpid(child, 0)
@@ -121,15 +122,15 @@ def test_a_killed_worker_is_an_error_and_the_others_end():
 
 @pytest.mark.parametrize("said", [True, False])
 def test_closing_while_rooms_are_built_ahead_leaves_nothing(said):
-    many = MobiliaVectorEnv(8, n_workers=2, autoreset_mode="next_step", scene="office")
-    many.reset(seed=1)  # eight rooms are being built, which takes half a second
+    many = MobiliaVectorEnv(4, n_workers=1, autoreset_mode="next_step", scene="office")
+    many.reset(seed=1)  # four rooms are being built, which takes half a second
     processes = [process for process, _ in many._rooms._workers]
     if said:
         many.close()
         with pytest.raises(gymnasium.error.ClosedEnvironmentError):
             many.reset()
     del many
-    assert [process.returncode for process in processes] == [0, 0]
+    assert [process.returncode for process in processes] == [0]
 
 
 def test_workers_end_with_a_parent_that_is_killed():

@@ -9,6 +9,8 @@ from scipy.stats import binom, bootstrap
 
 from slam.errors import InvalidValueError
 from slam.evaluation.statistics import (
+    bootstrap_draws,
+    drawn_medians,
     median_interval,
     paired,
     quantile,
@@ -40,6 +42,15 @@ def test_intervals_bear_infinities_as_quantiles_do():
     assert low == -INF
     assert high < 0.0
     assert median_interval([-v for v in always_better]) == (-high, INF)
+
+
+def test_medians_of_things_drawn_are_those_of_all_that_each_has():
+    rng = np.random.default_rng(3)
+    owners = rng.integers(0, 5, 40)
+    values = rng.choice([-INF, -1.0, 0.0, 0.3, 2.5, INF], 40)
+    draws = bootstrap_draws(5)
+    drawn = ([v for k in draw for v in values[owners == k].tolist()] for draw in draws)
+    assert drawn_medians(values, draws, owners).tolist() == [quantile(all_, 0.5) for all_ in drawn]
 
 
 def test_the_interval_of_a_ratio_is_the_paired_bootstraps():

@@ -83,7 +83,7 @@ def main(fault: str) -> None:
         elif message["type"] == "frame":
             count += 1
             if count == 1 and fault == "slow start":
-                time.sleep(0.5)
+                time.sleep(1.0)
             if count != 3 or not misbehave(fault, message["stamp_ns"]):
                 estimate(message["stamp_ns"], [count, 0, 0])
         elif message["type"] == "reset":

@@ -66,9 +66,9 @@ def test_a_good_guest_comes_through_and_starts_anew(stream):
         ("crash", "raised", "its process was ended by SIGSEGV"),
         ("exit", "raised", "its process ended with status 3; its last words: 'out of | ideas'"),
         ("close", "raised", "closed its standard output"),
-        ("hang", "hung", "no answer within 0.3 s"),
-        ("spin", "hung", "no answer within 0.3 s"),
-        ("half", "hung", "no answer within 0.3 s"),
+        ("hang", "hung", "no answer within 0.8 s"),
+        ("spin", "hung", "no answer within 0.8 s"),
+        ("half", "hung", "no answer within 0.8 s"),
         ("garbage", "bad", "no JSON object but 'Segmentation fault (just kidding)'"),
         ("error", "raised", "no idea at all"),
         ("terminal", "raised", "\\x1b]0;owned\\x07\\x9b2J\\u202e=1+1"),
@@ -79,7 +79,7 @@ def test_a_good_guest_comes_through_and_starts_anew(stream):
     ],
 )
 def test_each_fault_ends_the_guest_and_nothing_else(stream, fault, outcome, says):
-    slam = piped(fault, scan_s=0.3 if outcome == "hung" else 5.0)
+    slam = piped(fault, scan_s=0.8 if outcome == "hung" else 5.0)
     track = Track(fault, slam)
     failure = track.survive(stream)
     assert isinstance(failure, SlamFailedError)
@@ -125,12 +125,12 @@ def test_a_long_line_is_looked_through_once(stream):
 
 
 def test_the_first_scan_may_take_longer(stream):
-    assert Track("slow", piped("slow start", scan_s=0.25)).survive(stream[:2]) is None
+    assert Track("slow", piped("slow start", scan_s=0.8)).survive(stream[:2]) is None
 
 
 def test_a_guest_that_takes_no_more_input_hangs(stream):
     hello = '{"type":"hello","protocol":"mobilia-slam","version":1}'
-    slam = PipeSlam(["sh", "-c", f"read x; echo '{hello}'; exec sleep 60"], first_limit_s=0.5)
+    slam = PipeSlam(["sh", "-c", f"read x; echo '{hello}'; exec sleep 60"], first_limit_s=1.0)
     failure = Track("deaf", slam).survive(stream * 40)  # one frame would fit into the pipe
     assert failure is not None
     assert failure.outcome == "hung"
@@ -223,7 +223,7 @@ def test_a_class_behind_the_pipe_says_the_same_as_here_and_its_loop_is_not_ours(
     own, stream, monkeypatch
 ):
     monkeypatch.syspath_prepend(own)
-    child = Track("child", guarded("own_systems:Looping", Limits(scan_s=0.5), word="no idea"))
+    child = Track("child", guarded("own_systems:Looping", Limits(scan_s=1.0), word="no idea"))
     here = Track("here", create("odometry"))
     assert here.survive(stream[:6]) is None
     assert child.survive(stream[:6]) is None

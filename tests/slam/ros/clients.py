@@ -3,10 +3,12 @@
 
 import os
 import subprocess
+import time
 from collections.abc import Iterator, Sequence
 from contextlib import contextmanager
 
 from slam.ros.link import Link, open_link
+from slam.ros.robot import Robot
 from slam.ros.slam import Domain
 
 ANYWHERE = {"ROS_AUTOMATIC_DISCOVERY_RANGE": "SUBNET"}  # what ROS does by default
@@ -36,3 +38,10 @@ def on(middleware: str) -> Iterator[tuple[Domain, Link]]:
     yield domain, link
     link.close()
     domain.free()
+
+
+def met(link: Link, robot: Robot, clients: int = 1) -> None:
+    """Until so many clients listen to the scans, and have found their sender in their turn."""
+    while link.listeners(robot.topics["/scan"]) < clients:
+        time.sleep(0.02)
+    time.sleep(1.0)

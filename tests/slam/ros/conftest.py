@@ -22,16 +22,23 @@ KINDS = ("sensor_msgs/msg/LaserScan", "geometry_msgs/msg/TwistStamped", "tf2_msg
 
 @pytest.fixture(scope="session")
 def node(tmp_path_factory) -> Path:
-    """The C++ node, built."""
+    """The C++ node, built once for all processes of a run."""
     pytest.importorskip("cyclonedds", reason="needs the extra ros2")
     if not shutil.which("fastddsgen") or not shutil.which("g++"):
         pytest.skip("needs fastddsgen, libfastrtps-dev and g++ (Debian has them)")
-    folder = tmp_path_factory.mktemp("node")
-    (folder / "ros.idl").write_text(idl_of(KINDS))
-    words = ["g++", "-std=c++17", "-O0", "-w", "-I.", str(HERE / "node.cpp"), "ros.cxx"]
-    libraries = ["rosPubSubTypes.cxx", "-lfastrtps", "-lfastcdr", "-o", "node"]
-    for command in (["fastddsgen", "-replace", "ros.idl"], [*words, *libraries]):
-        subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=300)
+    base = tmp_path_factory.getbasetemp()
+    folder = (base.parent if "PYTEST_XDIST_WORKER" in os.environ else base) / "node"
+    folder.mkdir(exist_ok=True)
+    with (folder / "ros.idl").open("a") as file:
+        fcntl.flock(file, fcntl.LOCK_EX)
+        if file.tell():
+            return folder / "node"
+        file.write(idl_of(KINDS))
+        file.flush()
+        words = ["g++", "-std=c++17", "-O0", "-w", "-I.", str(HERE / "node.cpp"), "ros.cxx"]
+        libraries = ["rosPubSubTypes.cxx", "-lfastrtps", "-lfastcdr", "-o", "node"]
+        for command in (["fastddsgen", "-replace", "ros.idl"], [*words, *libraries]):
+            subprocess.run(command, cwd=folder, check=True, capture_output=True, timeout=300)
     return folder / "node"
 
 

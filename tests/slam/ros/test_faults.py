@@ -26,7 +26,7 @@ from slam.ros.node import TF, Node, decoded, transform_of
 from slam.ros.robot import Robot
 from slam.ros.template import said_ns
 from slam.system import create
-from tests.slam.ros.clients import PREFIXES, on, started
+from tests.slam.ros.clients import PREFIXES, met, on, started
 from tests.slam.ros.conftest import network
 from tests.slam.ros.frames import driven
 
@@ -44,8 +44,11 @@ from cyclonedds.builtin import BuiltinDataReader, BuiltinTopicDcpsPublication
 from cyclonedds.domain import DomainParticipant
 participant = DomainParticipant(int(sys.argv[1]))
 reader = BuiltinDataReader(participant, BuiltinTopicDcpsPublication)
-time.sleep(2.5)
-print(*(found.topic_name for found in reader.take(100)))
+end, seen = time.monotonic() + float(sys.argv[2]), set()
+while time.monotonic() < end and "rt/scan" not in seen:
+    time.sleep(0.1)
+    seen |= {found.topic_name for found in reader.take(100)}
+print(*seen)
 """  # as ros2 topic list does
 pytestmark = pytest.mark.slow
 
@@ -74,7 +77,7 @@ def test_of_many_that_speak_only_the_first_that_makes_sense_is_believed(client, 
         other.advertise(TF)
         say = TransformMessage((MAP, ODOM, 0.0))
         with closing(other), started(words, domain):
-            time.sleep(2.0)  # all have found each other
+            met(link, robot)
             for k, frame in enumerate(driven(100)):
                 node.sent(frame.odometry, said_ns(frame.stamp_ns))
                 robot.send(frame)
@@ -144,18 +147,21 @@ def test_another_machine_sees_the_robot_where_it_may(cable, asks, sees, monkeypa
         monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
         monkeypatch.setenv("CYCLONEDDS_URI", BY.format(here, ""))
     with on("dds") as (domain, link):
-        looks = [sys.executable, "-c", SEES, str(domain.number)]
         Robot(link)
-        out = {"check": True, "stdout": subprocess.PIPE, "text": True}
-        assert "rt/scan " in subprocess.run(looks, **out).stdout
+
+        def seen(*words: str, for_s: float) -> bool:
+            looks = [*words, sys.executable, "-c", SEES, str(domain.number), str(for_s)]
+            return "rt/scan" in subprocess.check_output(looks, text=True).split()
+
+        assert seen(for_s=30.0)
         monkeypatch.setenv("CYCLONEDDS_URI", BY.format(there, asks.format(here)))
-        assert ("rt/scan " in subprocess.run([*inside, *looks], **out).stdout) == sees
+        assert seen(*inside, for_s=30.0 if sees else 2.5) == sees
 
 
 def test_a_cut_of_five_seconds_holds_nothing_up_and_scans_flow_again(client, cable, monkeypatch):
     (middleware, words), (inside, here, there, switch) = client, cable
     monkeypatch.setenv("ROS_AUTOMATIC_DISCOVERY_RANGE", "SUBNET")
-    monkeypatch.setenv("CYCLONEDDS_URI", BY.format(here, ""))
+    monkeypatch.setenv("CYCLONEDDS_URI", BY.format(here, "<SPDPInterval>1s</SPDPInterval>"))
     monkeypatch.setenv("NODE_IP", there)
     monkeypatch.setenv("ROBOT_IP", here)
     with on(middleware) as (domain, link):
@@ -166,31 +172,26 @@ def test_a_cut_of_five_seconds_holds_nothing_up_and_scans_flow_again(client, cab
         link.subscribe(ANSWERS)
         robot = Robot(link)
         with started([*inside, *words], domain):
-            while not link.listeners(robot.topics["/scan"]):
-                time.sleep(0.02)
-            time.sleep(2.0)
-            frames, sent, came = driven(round(HZ * (CUT_S + 13.0))), {}, {}
-            down, up = round(HZ * 3.0), round(HZ * (3.0 + CUT_S))
+            met(link, robot)
+            down, up = round(HZ * 2.0), round(HZ * (2.0 + CUT_S))
+            frames, sent_s, came = driven(up + round(HZ * 30.0)), [], set()
+            stamps = [said_ns(frame.stamp_ns) for frame in frames]
+            before, after = set(stamps[:down]), set(stamps[up:])
             began_s = time.monotonic()
             for k, frame in enumerate(frames):
                 time.sleep(max(0.0, began_s + k / HZ - time.monotonic()))
                 if k in (down, up):
                     switch("down" if k == down else "up")
                 robot.send(frame)
-                sent[said_ns(frame.stamp_ns)] = time.monotonic()
+                sent_s.append(time.monotonic())
                 for taken in link.take(ANSWERS):
-                    stamp_ns = transform_of(decoded(TF.kind, taken.data), MAP, ODOM).stamp_ns
-                    came[stamp_ns] = time.monotonic()
-    stamps = list(sent)
-    answered = [sum(s in came for s in part) for part in (stamps[:down], stamps[up:])]
-    up_s = sent[stamps[up]]
-    back_s = min((came[s] - up_s for s in stamps[up:] if s in came), default=np.inf)
-    late_s = float(np.diff(list(sent.values())).max())
+                    came.add(transform_of(decoded(TF.kind, taken.data), MAP, ODOM).stamp_ns)
+                if len(came & after) > HZ:
+                    break
+    late_s = float(np.diff(sent_s).max())
     print(
-        f"{middleware}: of {down} scans before the cut {answered[0]} answered, of "
-        f"{len(stamps) - up} after it {answered[1]}; back {back_s:.2f} s after the cable; "
-        f"longest time between two frames {late_s:.2f} s"
+        f"{middleware}: over {sent_s[-1] - sent_s[up]:.1f} s after the cable, late {late_s:.2f} s"
     )
-    assert answered[0] >= 0.9 * down
-    assert stamps[-5] in came
+    assert len(came & before) >= 0.9 * down
+    assert len(came & after) > HZ
     assert late_s < CUT_S / 2  # the world goes on
