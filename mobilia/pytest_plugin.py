@@ -13,6 +13,8 @@ from typing import TYPE_CHECKING
 
 import pytest
 
+import mobilia
+
 if TYPE_CHECKING:
     from scripts.gate.stream import Recorded
 
@@ -29,9 +31,11 @@ def pytest_configure(config: pytest.Config) -> None:
 
 
 def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
-    """A test for each seed; a wrong mark is one line."""
+    """A test for each seed; a wrong mark, or a folder that hides a package, is one line."""
     if FIXTURE not in metafunc.fixturenames:
         return
+    if hiding := mobilia.hidden():
+        pytest.fail(hiding, pytrace=False)
     mark = metafunc.definition.get_closest_marker("mobilia")
     from scripts.gate.stream import asked
     from slam.errors import MobiliaError

@@ -68,6 +68,18 @@ def test_a_wrong_mark_is_told_in_one_line(ran, words):
     assert [line for line in ran[0].splitlines() if line.startswith("test_mark_") and words in line]
 
 
+def test_a_folder_that_hides_a_package_is_told(tmp_path):
+    (tmp_path / "slam").mkdir()
+    (tmp_path / "slam" / "__init__.py").touch()
+    (tmp_path / "test_it.py").write_text(
+        "import pytest\n@pytest.mark.mobilia(track='rush-hour')\ndef test_it(mobilia_stream): ...\n"
+    )
+    words = ("-m", "pytest", "-p", "mobilia.pytest_plugin", "-p", "no:cacheprovider")
+    alone = {"PYTEST_DISABLE_PLUGIN_AUTOLOAD": "1", "PYTHONPATH": f"{tmp_path}:{REPO}"}
+    said = python(*words, cwd=tmp_path, check=False, **alone).stdout
+    assert f"{tmp_path / 'slam'} hides the package 'slam' of mobilia: rename it" in said
+
+
 def test_the_plugin_loads_nothing_until_it_is_asked_for():
     words = "import sys, mobilia.pytest_plugin; print(*{n.partition('.')[0] for n in sys.modules})"
     assert not {"slam", "sim", "scripts", "numpy", "mujoco"} & {*python("-c", words).stdout.split()}
