@@ -13,7 +13,7 @@ from scripts.gate.runs import One
 from scripts.pages.table import NONE, Cell, Table
 
 SURE = f"wrong in at most {100.0 * WRONG:.0f} of 100 cases"
-HEAD = ("track", "runs", "lost", "ATE, cm", "RPE, cm/s", "error")
+HEAD = ("track", "runs", "lost", "aligned ATE, cm", "RPE, cm/s", "error")
 Pair = tuple[One, Row, Row]  # a run, its row before, and now
 
 

@@ -115,7 +115,7 @@ def _tell(paired: "Paired", out: Path) -> None:
     then = {} if worst is None else {f"What misled it, {worst}:": worst.blame(paired.slam)}
     publish(out, Page(
         title=f"Has {paired.slam} got worse?", said=paired.said(),
-        parts=[Part(title="Track by track", note="Before in brackets.", table=table)], next=then,
+        parts=[Part(title="Track by track", table=table)], next=then,
     ))  # fmt: skip
     if paired.verdict == "worse":
         raise typer.Exit(WORSE)
