@@ -54,9 +54,9 @@ class Paired:
                 f"{fifth} more error, or as many runs newly lost, is excluded ({SURE}).",
             ),
             "undecided": (
-                "may be worse than",
-                f"Neither that it is nor that {fifth} is excluded is sure: save more --seeds, or "
-                "another --level.",
+                "is undecided against",
+                f"Neither that it is worse nor that it is not by {fifth} is sure: save more "
+                "--seeds, or another --level.",
             ),
         }[self.verdict]
         failed = [str(now["failure"]) for _, _, now in self.pairs if now["failure"]]
