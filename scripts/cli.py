@@ -34,7 +34,7 @@ app = typer.Typer(
 VERBS = (
     "demo", "run", "render", "generate", "verify", "export", "list", "config", "bench", "doctor",
     "sensor-card", "reproduce", "compare", "benchmark", "drive", "blame", "live", "report",
-    "lifelong", "twin", "score", "tune",
+    "lifelong", "twin", "score", "gate", "tune",
 )  # fmt: skip
 for _name in VERBS:
     app.command(_name, cls=Verb)(command(spec_of(_name)))

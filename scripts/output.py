@@ -24,7 +24,7 @@ RECIPE = "recipe.json"
 GROWING = (
     "*.npz", "*.npz.sha256", "*.csv", "*.png", "*.svg", RECIPE, "report.html", "index.html",
     "leaderboard.json", "leaderboard.md", "submission_*.json", "days.json",
-    "tune.json", "spent.json",
+    "summary.md", "junit.xml", "tune.json", "spent.json",
     "*lives/*.json", "*lives/*.json.sha256", "runs.json",  # of folders begun before 0.3.0
 )  # fmt: skip
 FOREIGN = "{} holds files that mobilia did not write: choose another --out"

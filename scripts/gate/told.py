@@ -1,0 +1,125 @@
+# SPDX-License-Identifier: Apache-2.0
+"""What a gate says: a sentence, a table, Markdown for a pull request, JUnit's XML for a CI."""
+
+import math
+from collections.abc import Sequence
+from dataclasses import dataclass, field
+from statistics import mean
+from xml.etree import ElementTree
+
+from scripts.benchmark.runs_file import Row
+from scripts.gate.evidence import ERRORS, LEAST, WORSE, WRONG, Evidence, Verdict, change
+from scripts.gate.runs import One
+from scripts.pages.table import NONE, Cell, Table
+
+SURE = f"wrong in at most {100.0 * WRONG:.0f} of 100 cases"
+HEAD = ("track", "runs", "lost", "aligned ATE, cm", "RPE, cm/s", "error")
+Pair = tuple[One, Row, Row]  # a run, its row before, and now
+
+
+@dataclass(kw_only=True, eq=False)
+class Paired:
+    """A SLAM beside saved results, run by run.
+
+    slam, against  its name, and that of the file
+    total          runs that there are at most
+    """
+
+    slam: str
+    against: str
+    total: int
+    pairs: list[Pair] = field(default_factory=list)
+    evidence: Evidence = field(default_factory=Evidence)
+
+    def add(self, one: One, before: Row, now: Row) -> None:
+        """One more run."""
+        self.pairs.append((one, before, now))
+        self.evidence.add(change(before, now))
+
+    @property
+    def verdict(self) -> Verdict:
+        """What is sure by now."""
+        return self.evidence.verdict
+
+    def said(self) -> list[str]:
+        """The verdict, what it rests on, and the first failure."""
+        lost, held = self.evidence.newly
+        ratio = _times(self.evidence.changes)
+        facts = f"{lost} newly lost, {held} newly held, {len(self.pairs)} of {self.total} runs"
+        fifth = f"{100.0 * WORSE:.0f} %"
+        first, more = {
+            "worse": ("is worse than", f"Such a verdict is {SURE}."),
+            "not worse": (
+                "is not worse than",
+                f"{fifth} more error, or as many runs newly lost, is excluded ({SURE}).",
+            ),
+            "undecided": (
+                "is undecided against",
+                f"Neither that it is worse nor that it is not by {fifth} is sure: save more "
+                "--seeds, or another --level.",
+            ),
+        }[self.verdict]
+        failed = [str(now["failure"]) for _, _, now in self.pairs if now["failure"]]
+        said = f"`{self.slam}` {first} {self.against}: error {ratio}, {facts}."
+        return [said, more, *failed[:1]]
+
+    def worst(self) -> One | None:
+        """The run that got worse most; None where none did."""
+        told = [(value, one) for one, value in self._changes() if value is not None and value > 0.0]
+        return max(told, key=lambda pair: pair[0])[1] if told else None
+
+    def table(self) -> Table:
+        """A row for each track."""
+        tracks = dict.fromkeys(one.track for one, _, _ in self.pairs)
+        rows = [self._row(track) for track in tracks]
+        return Table(caption=f"now [{self.against}]", head=HEAD, rows=rows)
+
+    def markdown(self) -> str:
+        """For a comment or the summary of a job."""
+        head, *more = self.said()
+        parts = [f"### {head}", *more, f"Now, in brackets {self.against}:", self.table().markdown()]
+        worst = self.worst()
+        if worst is not None:
+            parts.append(f"The run that got worse most:\n\n    {worst.blame(self.slam)}")
+        return "\n\n".join(parts) + "\n"
+
+    def junit(self) -> str:
+        """One test case: the verdict is on all runs together. Undecided is skipped."""
+        kind = {"worse": "failure", "undecided": "skipped"}.get(self.verdict)
+        counts = {"tests": "1", "failures": str(int(kind == "failure")), "errors": "0",
+                  "skipped": str(int(kind == "skipped"))}  # fmt: skip
+        suite = ElementTree.Element("testsuite", {"name": "mobilia gate", **counts})
+        about = {"classname": "mobilia.gate", "name": f"{self.slam} against {self.against}"}
+        case = ElementTree.SubElement(suite, "testcase", about)
+        if kind is not None:
+            ElementTree.SubElement(case, kind, {"message": " ".join(self.said())})
+        ElementTree.SubElement(case, "system-out").text = self.markdown()
+        ElementTree.indent(suite)
+        return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True) + "\n"
+
+    def _changes(self) -> list[tuple[One, float | None]]:
+        return [(one, change(before, now)) for one, before, now in self.pairs]
+
+    def _row(self, track: str) -> list[Cell]:
+        own = [(before, now) for one, before, now in self.pairs if one.track == track]
+        lost = _cell(*(str(sum(row["lost"] for row in rows)) for rows in zip(*own, strict=True)))
+        held = [pair for pair in own if not any(row["lost"] for row in pair)]
+        before, now = ([pair[k] for pair in held] for k in (0, 1))
+        errors = [_cell(_middle(before, key), _middle(now, key)) for key in ERRORS]
+        times = _times([value for one, value in self._changes() if one.track == track])
+        return [Cell(text=track), Cell(text=str(len(own))), lost, *errors, Cell(text=times)]
+
+
+def _cell(before: str, now: str) -> Cell:
+    return Cell(text=now, small=before)
+
+
+def _middle(rows: Sequence[Row], key: str) -> str:
+    """Geometric mean of an error, in cm."""
+    logs = [math.log(max(row[key], LEAST)) for row in rows if row[key] is not None]
+    return f"{100.0 * math.exp(mean(logs)):.2f}" if logs else NONE
+
+
+def _times(changes: Sequence[float | None]) -> str:
+    held = [value for value in changes if value is not None and math.isfinite(value)]
+    return f"× {math.exp(mean(held)):.2f}" if held else NONE
