@@ -28,6 +28,7 @@ _ALWAYS = {
     "compare": (*_TABLES, "paired.csv"),
     "drive": (*_TABLES, "goals.csv", "closed_loop.png", "paths.png"),
     "blame": ("blame.json", "blame.png"),
+    "shrink": ("shrink.json", "errors.png"),
     "days": ("days.csv", "days.json"),
     "benchmark": ("leaderboard.json", "leaderboard.csv", "leaderboard.md"),
 }
@@ -68,7 +69,7 @@ def _way(folder: Path) -> Callable[[Path], list[Finding]] | None:
 
 
 def _check_result(folder: Path) -> list[Finding]:
-    """A folder of ``run``, ``demo``, ``compare``, ``drive`` or ``blame``, and those within it."""
+    """A folder of a verb that is no dataset, and those within it."""
     listed, found = listed_in(folder)
     if listed:
         found = faults(folder, listed)
