@@ -24,16 +24,20 @@ from slam.interface import RunsAtTheEnd
 from slam.replay import Track
 from slam.system import create
 
-SHORT_S = 10.0  # s, of a part that is looked for
+SHORT_S = 10.0  # s that any part may take to be lost
 BEGIN_S, BEGINS = 2.0, 12  # s from one beginning that is tried to the next; so many, by the loss
-# One scan in so many of what the SLAM got, and one beam; the next where no short part is lost.
-COARSER = ((1, 1), (2, 1), (1, 4), (4, 1), (2, 4), (1, 16), (8, 1), (4, 4), (2, 16))
+# s of parts that are looked for, one scan in so many of what the SLAM got, and one beam in so many;
+# the next where few movers do not lose it.
+LADDER = (
+    (10.0, 1, 1), (10.0, 2, 1), (10.0, 1, 4), (10.0, 4, 1), (10.0, 2, 4), (10.0, 1, 16),
+    (10.0, 8, 1), (10.0, 4, 4), (10.0, 2, 16), (20.0, 1, 1),
+)  # fmt: skip
 SHORTEST = 4  # parts of which the movers are taken out
 FEW = 3  # movers that are tried alone before others are taken out by halves
 THINNED = 2  # parts of which first the scans and beams are, where no few movers will do
 LONGEST_STEP = 16  # states of the tape, half a second each
 LEAST_BEAMS, BATCH = 16, 10  # beams; scans from one look at the loss to the next
-MOST_S = 1200.0  # s of the run that are tried in all; then the smallest so far is it
+MOST_S = 1200.0  # s that are simulated again in all; then the smallest so far is it
 T = TypeVar("T")
 
 
@@ -57,7 +61,7 @@ class Shrinking:
     """Tries parts of one run.
 
     case, tape  the run, as far as events were left out;   tape  every scan of it
-    tried       the end of each part that was tried;   spent_s  of the run, in all of them
+    tried       the end of each part that was tried;   spent_s  that was simulated again
     """
 
     def __init__(self, case: Case, note: Callable[[str], None] = lambda words: None) -> None:
@@ -105,7 +109,8 @@ class Shrinking:
             self.note(f"try {len(self.tried) + 1}: at {part.first * self.period_s:.1f} s, {movers}")
             row = lost_row(self.case.slam, self.frames(part))
             self.tried[key] = None if row is None else part.first + row * part.every + 1
-            self.spent_s += ((self.tried[key] or part.last) - part.first) * self.period_s
+            if part.keep is not None:
+                self.spent_s += ((self.tried[key] or part.last) - part.first) * self.period_s
         end = self.tried[key]
         return None if end is None else replace(part, last=end)
 
@@ -118,45 +123,57 @@ class Shrinking:
         end = self.lost(self.whole)
         if end is None:
             raise not_lost(self.case.slam, list(self.frames(self.whole)))
-        part = self._without_events(self._later(self._with_few(self._windows(end))))
+        part = self._without_events(self._later(self._with_few(end)))
         return self._later(self._minimal(self._thin(part)))
 
-    def _windows(self, whole: Part) -> list[Part]:
-        """The shortest parts with everybody, the best first; ``whole`` where none is short.
-
-        Fewer scans and beams where all of them do not lose it, as in ``_thin``.
-        """
-        step, middle = round(BEGIN_S / self.period_s), whole.last - round(SHORT_S / self.period_s)
-        rows = {row // step: row for row in sorted(self.tape.states, reverse=True)}.values()
-        begins = sorted(rows, key=lambda row: abs(row - middle))[:BEGINS]
-        for every, beams in COARSER:
-            like = replace(whole, every=every * whole.every, beams=beams)
-            ends = [self.lost(replace(like, first=first, last=first + 1)) for first in begins]
-            found = sorted(filter(None, ends), key=lambda part: (part.scans, part.first))
-            if (every, beams) != COARSER[0]:
-                found = [part for part in found if not self.lost(replace(part, keep=()))]
-            if found:
-                return found[:SHORTEST]
-        return [whole]
-
-    def _with_few(self, windows: Sequence[Part]) -> Part:
-        """One of these with as few movers as can be."""
-        part = windows[0]
-        for part, count in self._tries(windows):
-            names = [one.name for one in sightings(self.tape, part.first, part.last - 1)][:count]
-            holders = [hold.holder for hold in self.tape.holds if hold.held in names]
-            keep = tuple(dict.fromkeys([*names, *holders]))  # without who holds it, it goes out
+    def _with_few(self, whole: Part) -> Part:
+        """A short part with as few movers as can be."""
+        first: list[Part] = []
+        for rung in LADDER:
+            windows = self._windows(whole, *rung)
+            first = first or windows
+            for part, count in self._tries(windows):
+                few = replace(part, keep=self._likeliest(part, count))
+                if end := self.lost(few):
+                    return self._minimal(end)
+        part = self._thin((first or [whole])[0])
+        kinds = zip(self.tape.names, self.tape.kinds, strict=True)
+        everybody = [name for name, kind in kinds if kind != "robot"]
+        for keep in (self._likeliest(part, len(everybody)), tuple(everybody)):
             if end := self.lost(replace(part, keep=keep)):
                 return self._minimal(end)
         return part
 
+    def _windows(self, whole: Part, seconds: float, every: int, beams: int) -> list[Part]:
+        """The shortest parts with everybody, the best first.
+
+        Where scans and beams are left out they must not be lost with nobody, as in ``_thin``.
+        """
+        step, middle = round(BEGIN_S / self.period_s), whole.last - round(SHORT_S / self.period_s)
+        rows = {row // step: row for row in sorted(self.tape.states, reverse=True)}.values()
+        begins = sorted(rows, key=lambda row: abs(row - middle))[:BEGINS]
+        like, length = (
+            replace(whole, every=every * whole.every, beams=beams),
+            seconds / self.period_s,
+        )
+        ends = [self.lost(replace(like, first=k, last=k + round(length))) for k in begins]
+        found = sorted(filter(None, ends), key=lambda part: (part.scans, part.first))
+        if every > 1 or beams > 1:
+            found = [part for part in found if not self.lost(replace(part, keep=()))]
+        return found[:SHORTEST]
+
     def _tries(self, windows: Sequence[Part]) -> Iterator[tuple[Part, int]]:
-        """Parts, and how many movers stay in them: few, then few in thin ones, then all."""
+        """Parts, and how many movers stay in them; then thin ones."""
         thin = (self._thin(part) for part in windows[:THINNED])
         for parts in (windows, thin):
             same = list(parts)
             yield from ((part, count) for count in range(FEW + 1) for part in same)
-        yield same[0], len(self.tape.names)
+
+    def _likeliest(self, part: Part, count: int) -> tuple[str, ...]:
+        """So many of the movers seen in it, and who holds them: else they go out with that one."""
+        names = [one.name for one in sightings(self.tape, part.first, part.last - 1)][:count]
+        holders = [hold.holder for hold in self.tape.holds if hold.held in names]
+        return tuple(dict.fromkeys([*names, *holders]))
 
     def _minimal(self, part: Part) -> Part:
         """With movers of which none can be left out."""

@@ -60,7 +60,7 @@ class Shrunk:
         keep, (before, left) = self.world["cut"]["keep"], self.sizes["seconds"]
         who = f"only {', '.join(keep)} can move" if keep else "nothing can move"
         who = "all movers stay" if keep is None else who
-        size, stop = (folder / RECIPE).stat().st_size, f"; it stops after {MOST_S:g} s of run"
+        size, stop = (folder / RECIPE).stat().st_size, f"; it ended after {MOST_S:g} s"
         return [
             f"`{self.slam}` is lost in {left:g} s of {before:g} s; {who}.",
             f"{RECIPE} has {size} bytes; replayed, it gives the same scans and the same loss. "
