@@ -10,8 +10,9 @@ import csv
 import json
 import tempfile
 import time
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from pathlib import Path
+from statistics import median
 from typing import Any
 
 from scripts.benchmark.tracks import TRACKS
@@ -22,13 +23,20 @@ from scripts.debugger.shrunk import shrunk
 from scripts.engine import Stage, make
 from scripts.film.footage import of_scene
 from scripts.jobs import Job
+from scripts.marks import check_page, fill_page, table
 from scripts.names import file_name
 from scripts.output import RECIPE, write_recipe
 from scripts.result_files import RESULTS
 from slam.files import write_text
 
 SLAMS = ("shunting", "occupancy", "ekf", "karto", "kiss-icp")
-LEVEL = 1.0
+LEVEL, MARK = 1.0, "shrink"
+MOST_S, MOST = 10.0, 3  # s and movers of what counts as small
+COLUMNS = {
+    "seconds_before": "s", "seconds_left": "s left", "movers_before": "movers",
+    "movers_left": "movers left", "scans_left": "scans left", "beams_left": "beams left",
+    "recipe_bytes": "recipe, bytes", "tries": "parts tried", "wall_s": "wall, s",
+}  # fmt: skip
 
 
 def chosen(slams: Sequence[str], tracks: int) -> list[tuple[str, str, int]]:
@@ -63,6 +71,22 @@ def shrink(path: Path, *, slam: str, track: str, seed: int) -> None:
     write_text(path, json.dumps({**row, "tries": made.tries, "wall_s": round(wall_s)}))
 
 
+def told(rows: Sequence[Mapping[str, Any]]) -> str:
+    """What came out in a sentence, and a table of all runs and of each SLAM's medians."""
+    small = [row for row in rows if row["seconds_left"] <= MOST_S and row["movers_left"] <= MOST]
+    heads = ["SLAM", "track", "seed", *COLUMNS.values(), "left"]
+    keys = ("slam", "track", "seed", *COLUMNS, "left")
+    cells = [[str(row[key]) for key in keys] for row in rows]
+    for slam in dict.fromkeys(row["slam"] for row in rows):
+        own = [row for row in rows if row["slam"] == slam]
+        middle = [f"{median(row[key] for row in own):g}" for key in COLUMNS]
+        cells.append([f"all of {slam}, median", "", str(len(own)), *middle, ""])
+    return (
+        f"{len(small)} of {len(rows)} became at most {MOST_S:g} s with at most {MOST} movers. Each "
+        f"recipe was replayed, and lost again.\n\n{table(heads, cells)}"
+    )
+
+
 @ended
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
@@ -70,9 +94,10 @@ def main(arguments: Sequence[str] | None = None) -> None:
     parser.add_argument("--slam", nargs="+", default=list(SLAMS))
     parser.add_argument("--tracks", type=int, default=4, help="of each SLAM")
     parser.add_argument("--out", type=Path, default=Path("out/shrunk"), help="finished runs")
-    parser.add_argument("--results", type=Path, default=RESULTS / "shrunk.csv")
+    parser.add_argument("--page", type=Path, default=RESULTS.parent / f"{MARK}.md")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
     given = parser.parse_args(arguments)
+    check_page(given.page, MARK)
     jobs = [
         Job(
             name=f"{file_name(slam)}_{track}_{seed}", call=shrink, suffix=".json",
@@ -82,8 +107,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
     ]  # fmt: skip
     files = make([Stage(title="shrinking", folder="runs", jobs=jobs)], given.out, jobs=given.jobs)
     rows = [json.loads(file.read_text(encoding="utf-8")) for file in files.values()]
-    lines = [",".join(rows[0]), *(",".join(map(str, row.values())) for row in rows)]
-    write_text(given.results, "\n".join(lines) + "\n")
+    fill_page(given.page, MARK, told(rows))
 
 
 if __name__ == "__main__":
