@@ -129,13 +129,17 @@ class Shrinking:
     def _with_few(self, whole: Part) -> Part:
         """A short part with as few movers as can be."""
         first: list[Part] = []
+        more: list[Part] = []  # with more than a few movers: holders came with who they hold
         for rung in LADDER:
             windows = self._windows(whole, *rung)
             first = first or windows
             for part, count in self._tries(windows):
-                few = replace(part, keep=self._likeliest(part, count))
-                if end := self.lost(few):
-                    return self._minimal(end)
+                end = self.lost(replace(part, keep=self._likeliest(part, count)))
+                more += [self._minimal(end)] if end else []
+                if end and len(more[-1].keep or ()) <= FEW:
+                    return more[-1]
+        if more:
+            return min(more, key=lambda part: len(part.keep or ()))
         part = self._thin((first or [whole])[0])
         kinds = zip(self.tape.names, self.tape.kinds, strict=True)
         everybody = [name for name, kind in kinds if kind != "robot"]
