@@ -31,7 +31,7 @@ from slam.files import write_text
 
 SLAMS = ("shunting", "occupancy", "ekf", "karto", "kiss-icp")
 LEVEL, MARK = 1.0, "shrink"
-MOST_S, MOST = 10.0, 3  # s and movers of what counts as small
+MOST_S, MOST, MOST_BYTES = 10.0, 3, 1024  # s, movers and recipe of what counts as small
 COLUMNS = {
     "seconds_before": "s", "seconds_left": "s left", "movers_before": "movers",
     "movers_left": "movers left", "scans_left": "scans left", "beams_left": "beams left",
@@ -74,6 +74,7 @@ def shrink(path: Path, *, slam: str, track: str, seed: int) -> None:
 def told(rows: Sequence[Mapping[str, Any]]) -> str:
     """What came out in a sentence, and a table of all runs and of each SLAM's medians."""
     small = [row for row in rows if row["seconds_left"] <= MOST_S and row["movers_left"] <= MOST]
+    light = sum(row["recipe_bytes"] <= MOST_BYTES for row in rows)
     heads = ["SLAM", "track", "seed", *COLUMNS.values(), "left"]
     keys = ("slam", "track", "seed", *COLUMNS, "left")
     cells = [[str(row[key]) for key in keys] for row in rows]
@@ -82,8 +83,9 @@ def told(rows: Sequence[Mapping[str, Any]]) -> str:
         middle = [f"{median(row[key] for row in own):g}" for key in COLUMNS]
         cells.append([f"all of {slam}, median", "", str(len(own)), *middle, ""])
     return (
-        f"{len(small)} of {len(rows)} became at most {MOST_S:g} s with at most {MOST} movers. Each "
-        f"recipe was replayed, and lost again.\n\n{table(heads, cells)}"
+        f"{len(small)} of {len(rows)} became at most {MOST_S:g} s with at most {MOST} movers, "
+        f"and {light} recipes have at most 1 kB. Each was replayed, and lost again."
+        f"\n\n{table(heads, cells)}"
     )
 
 
