@@ -33,8 +33,8 @@ app = typer.Typer(
 )
 VERBS = (
     "demo", "run", "render", "generate", "verify", "export", "list", "config", "bench", "doctor",
-    "sensor-card", "reproduce", "compare", "benchmark", "drive", "blame", "live", "report",
-    "lifelong", "twin", "score", "gate", "tune",
+    "sensor-card", "reproduce", "compare", "benchmark", "drive", "blame", "shrink", "live",
+    "report", "lifelong", "twin", "score", "gate", "tune",
 )  # fmt: skip
 for _name in VERBS:
     app.command(_name, cls=Verb)(command(spec_of(_name)))

@@ -29,6 +29,7 @@ _ALWAYS = {
     "drive": (*_TABLES, "goals.csv", "closed_loop.png", "paths.png"),
     "blame": ("blame.json", "blame.png"),
     "tune": ("trials.csv", "trials.png", "tune.json"),
+    "shrink": ("shrink.json", "errors.png"),
     "days": ("days.csv", "days.json"),
     "benchmark": ("leaderboard.json", "leaderboard.csv", "leaderboard.md"),
 }
@@ -69,7 +70,7 @@ def _way(folder: Path) -> Callable[[Path], list[Finding]] | None:
 
 
 def _check_result(folder: Path) -> list[Finding]:
-    """A folder of ``run``, ``demo``, ``compare``, ``drive``, ``blame`` or ``tune``, and in it."""
+    """A folder of a verb that is no dataset, and those within it."""
     listed, found = listed_in(folder)
     if listed:
         found = faults(folder, listed)

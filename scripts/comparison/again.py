@@ -2,7 +2,7 @@
 """A run on file as what would make it again: for films and counterfactuals."""
 
 from collections.abc import Mapping
-from dataclasses import dataclass, fields
+from dataclasses import asdict, dataclass, fields
 from pathlib import Path
 from typing import Any
 
@@ -15,10 +15,13 @@ from scripts.spec import command_line
 from sim.core.versions import check_world, world_of
 from sim.recording.recipe import Made, Recipe, read_recipe
 from sim.recording.sums import check_vouched
+from sim.twins.cut import WHOLE, Cut
 from slam.errors import InvalidValueError, LogFormatError, UnknownNameError
+from slam.shaped import shaped
 
-OF_ONE = ("run", "demo", None)  # commands that leave one run
-OF_THE_RUN = ("slams", "seconds", "simulation")  # in the recipe of a run; the rest is the world's
+OF_ONE = ("run", "demo", "shrink", None)  # commands that leave one run
+# In the recipe of a run; the rest is the world's.
+OF_THE_RUN = ("slams", "seconds", "simulation", "cut")
 _OF_PLAN = [field.name for field in fields(Plan)]
 
 
@@ -28,14 +31,14 @@ class Again:
 
     settings  arguments of ``Simulation``, but for its labels
     seconds   of the tour
-    slams     that ran, by names of a file;   every  they got one scan in so many
+    slams     that ran, by names of a file;   cut  what they got of the tour
     twin      of an episode: which version of its drive it is;   made  who recorded it
     """
 
     settings: Mapping[str, Any]
     seconds: float
     slams: tuple[str, ...] = ()
-    every: int = 1
+    cut: Cut = WHOLE
     twin: str = ""
     made: Made | None = None
 
@@ -43,6 +46,11 @@ class Again:
     def slam(self) -> str:
         """The one that the run was about; "" where nobody says."""
         return next((name for name in self.slams if name != "odometry"), "")
+
+    def told(self) -> dict[str, Any]:
+        """As ``scripts.film.footage.of_scene`` and the recipe of a run have it."""
+        cut = {} if self.cut == WHOLE else {"cut": asdict(self.cut)}
+        return {**self.settings, "seconds": self.seconds, **cut}
 
 
 def again(path: Path, trust: bool = False) -> Again:
@@ -66,7 +74,7 @@ def again(path: Path, trust: bool = False) -> Again:
     if "recipe" in words:
         made = read_recipe(recipe)
         check_world(recipe, made.world)
-        return _of(made.recipe, trust, twin=made.recipe.twin, made=made)
+        return again_of(made.recipe, trust, twin=made.recipe.twin, made=made)
     command, settings = words.get("command"), words.get("settings")
     if command not in OF_ONE:
         raise LogFormatError(recipe.parent, why_no_run(recipe.parent, command))
@@ -85,7 +93,7 @@ def again(path: Path, trust: bool = False) -> Again:
     world = {key: value for key, value in settings.items() if key not in OF_THE_RUN}
     (scene,) = scenes_of(recipe, {"scene": settings["scene"]})
     world["scene"] = located(admitted(scene, "scene", trust))
-    return Again(settings=world, seconds=settings["seconds"], slams=slams)
+    return Again(settings=world, seconds=settings["seconds"], slams=slams, cut=_cut(settings))
 
 
 def _episodes_in(folder: Path) -> str:
@@ -94,9 +102,10 @@ def _episodes_in(folder: Path) -> str:
     return "" if first is None else f": name one of those in it, as {first}"
 
 
-def _of(recipe: Recipe, trust: bool, **more: Any) -> Again:
+def again_of(recipe: Recipe, trust: bool = False, **more: Any) -> Again:
+    """Of a recipe; ``trust`` as in ``again``, ``more`` of ``Again``."""
     settings = {key: value for key, value in recipe.simulation().items() if key != "labels"}
-    settings["scene"] = admitted(settings["scene"], "scene", trust)
+    settings |= {"laser": recipe.laser_name, "scene": admitted(recipe.scene, "scene", trust)}
     return Again(settings=settings, seconds=recipe.seconds, **more)
 
 
@@ -109,6 +118,15 @@ def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
     seconds = settings["seconds"]
     if isinstance(seconds, bool) or not isinstance(seconds, int | float):
         raise LogFormatError(path, f"no recipe of a run: seconds must be a number, got {seconds!r}")
+    try:
+        _cut(settings)
+    except InvalidValueError as error:
+        raise LogFormatError(path, f"no recipe of a run: {error}") from error
+
+
+def _cut(settings: Mapping[str, Any]) -> Cut:
+    cut: Cut = shaped("cut", settings.get("cut", {}), Cut)
+    return cut
 
 
 def run_of(path: Path, trust: bool = False) -> Again:
@@ -132,7 +150,8 @@ def run_of(path: Path, trust: bool = False) -> Again:
         raise LogFormatError(recipe, why) from error
     for run in plan.runs():
         if run.name == path.stem:
-            return _of(plan.recipe(run), trust, slams=plan.slams, every=plan.every)
+            cut = Cut(every=plan.every)
+            return again_of(plan.recipe(run), trust, slams=plan.slams, cut=cut)
     raise LogFormatError(path, f"no run of that comparison, whose first is {plan.runs()[0].name}")
 
 

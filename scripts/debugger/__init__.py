@@ -1,2 +1,2 @@
 # SPDX-License-Identifier: Apache-2.0
-"""``mobilia blame``: which mover misled a SLAM, found by running the world without it."""
+"""``mobilia blame`` and ``shrink``: which mover misled a SLAM, and in how little of the run."""

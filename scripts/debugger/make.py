@@ -282,8 +282,7 @@ def _compare(tape: Tape) -> None:
 
 def _recipe(case: Case, question: Question) -> dict[str, Any]:
     """What makes it again."""
-    settings = {k: repr(v) if k == "laser" else v for k, v in case.settings.items()}
     asked = {f"asked_{k}": v for k, v in vars(replace(question)).items() if k != "rule"}
     rule = {f"rule_{k}": v for k, v in vars(question.rule).items()}
     own = {"slam": case.slam, "seconds": case.seconds, "every": case.every}
-    return {**own, "simulation": settings, **asked, **rule}
+    return {**own, "simulation": case.settings, **asked, **rule}

@@ -28,6 +28,7 @@ from sim.recording.sums import check_vouched
 from sim.simulation import Simulation, n_frames
 from sim.twins import absence
 from sim.twins.absence import Change
+from sim.twins.cut import Cut
 from slam import se2
 from slam.errors import (
     InvalidValueError,
@@ -97,12 +98,14 @@ def case_of(folder: Path, slam: str | None, every: int, trust: bool = False) -> 
         )
     usual = "odometry" if found.slams else "shunting"
     slam = admitted(slam or found.slam or usual, "SLAM", trust)
+    if found.cut != Cut(every=found.cut.every):
+        raise LogFormatError(folder, "is part of a run, which cannot be changed: take the whole")
+    if is_run(folder) and every not in (1, found.cut.every):
+        raise InvalidValueError(
+            f"--every: in this comparison SLAMs got one scan in {found.cut.every}"
+        )
+    every = found.cut.every if every == 1 else every
     if is_run(folder):
-        if every not in (1, found.every):
-            raise InvalidValueError(
-                f"--every: in this comparison SLAMs got one scan in {found.every}"
-            )
-        every = found.every
         recorded = RunFile(folder).believed(slam).poses if slam in found.slams else None
     elif found.made is None:
         home = folder if folder.is_dir() else folder.parent
@@ -150,13 +153,16 @@ class Strip:
     poses: list[Float] = field(default_factory=list)
     beams: list[NDArray[np.int64]] = field(default_factory=list)
 
-    def take(self, frame: Frame, poses: Float, beams: NDArray[np.int64], track: Track) -> None:
-        """One more row."""
+    def take(
+        self, frame: Frame, poses: Float, beams: NDArray[np.int64], track: Track | None
+    ) -> None:
+        """One more row; without a track the frame keeps its truth and its labels."""
         assert frame.truth is not None
-        seen = shown(track.system, frame)
+        seen = frame if track is None else shown(track.system, frame)
         self.frames.append(seen)
         self.truth.append(frame.truth)
-        self.believed.append(track.take(seen).T_map_robot)
+        if track is not None:
+            self.believed.append(track.take(seen).T_map_robot)
         self.poses.append(poses)
         self.beams.append(beams)
 
@@ -212,10 +218,15 @@ def simulate(case: Case) -> Simulation:
     return Simulation(**{**case.settings, "labels": True})
 
 
-def record(case: Case, note: Callable[[int, int], None] = lambda done, of: None) -> Tape:
-    """Run the case from beginning to end; ``note`` gets scans done and of how many."""
+def record(
+    case: Case, note: Callable[[int, int], None] = lambda done, of: None, *, heard: bool = True
+) -> Tape:
+    """Run the case from beginning to end; ``note`` gets scans done and of how many.
+
+    heard  whether its SLAM hears them; else frames keep their truth and their labels
+    """
     simulation = simulate(case)
-    world, track = simulation.world, Track(case.slam, create(case.slam))
+    world, track = simulation.world, Track(case.slam, create(case.slam)) if heard else None
     movers = world.scene.movers
     tape = Tape(
         case=case, names=world.mover_names, kinds=tuple(m.kind for m in movers), movers=movers,
@@ -239,7 +250,9 @@ def record(case: Case, note: Callable[[int, int], None] = lambda done, of: None)
 class _Ear:
     """Hears every scan and passes on one in so many, with the covariance of all motion since."""
 
-    def __init__(self, simulation: Simulation, strip: Strip, track: Track, every: int) -> None:
+    def __init__(
+        self, simulation: Simulation, strip: Strip, track: Track | None, every: int
+    ) -> None:
         self._simulation, self._strip, self._track = simulation, strip, track
         self._every, self._motion = every, MotionSum()
 

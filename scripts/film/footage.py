@@ -16,10 +16,11 @@ from scripts.film.show import Show
 from scripts.film.stage import Room, Stage
 from scripts.names import is_run
 from scripts.output import RECIPE
-from sim.moments import Moment, thinned, toured
+from sim.moments import Moment, toured
 from sim.recording.sums import check_vouched
 from sim.recording.verify import check_bag
 from sim.simulation import Simulation, n_frames
+from sim.twins.cut import WHOLE, Cut, Thin
 from sim.twins.twins import Twins
 from sim.view.moment import Moments
 from slam.errors import (
@@ -119,8 +120,7 @@ def open_run(path: Path, *, view: str | None = "follow", trust: bool = False) ->
     try:
         if found.twin:
             return _of_twin(found, view)
-        settings = {**found.settings, "seconds": found.seconds}
-        return replace(of_scene(settings, view=view, every=found.every), slam=found.slam)
+        return replace(of_scene(found.told(), view=view), slam=found.slam)
     except (TypeError, ValueError, UnknownNameError) as error:
         raise LogFormatError(path, f"no recipe of a run: {error}") from error
 
@@ -142,14 +142,16 @@ def _of_twin(found: Again, view: str | None) -> Footage:
     return footage
 
 
-def of_scene(
-    settings: Mapping[str, Any], *, view: str | None = "follow", every: int = 1
-) -> Footage:
-    """A simulated tour: scene, seconds, and what ``Simulation`` takes."""
-    seconds = settings["seconds"]
-    simulation = Simulation(**{k: v for k, v in settings.items() if k != "seconds"}, labels=True)
-    title = title_of(settings)
-    return of_simulation(simulation, seconds=seconds, title=title, view=view, every=every)
+def of_scene(settings: Mapping[str, Any], *, view: str | None = "follow") -> Footage:
+    """A simulated tour, or a part of it: scene, seconds, ``cut`` (fields of ``Cut``), and what
+    ``Simulation`` takes."""
+    seconds, cut = settings["seconds"], Cut(**settings.get("cut", {}))
+    world = {k: v for k, v in settings.items() if k not in ("seconds", "cut")} | {"labels": True}
+    simulation = Simulation(**world)
+    return of_simulation(
+        simulation, None if cut == WHOLE else lambda: cut.moments(simulation, world, seconds),
+        seconds=seconds - cut.from_s, title=title_of(settings), view=view, cut=cut,
+    )  # fmt: skip
 
 
 def of_simulation(
@@ -159,19 +161,18 @@ def of_simulation(
     seconds: float,
     title: str,
     view: str | None = "follow",
-    every: int = 1,
+    cut: Cut = WHOLE,
 ) -> Footage:
-    """A simulation at hand and the moments that it goes through, a tour unless said otherwise; one
-    in ``every`` of them is shown."""
-    whole = moments or (lambda: toured(simulation, seconds))
-    shown = whole if every == 1 else lambda: thinned(whole(), every)
-    stage = Room(simulation, shown, view)
+    """A simulation at hand and the moments that it goes through, a tour unless said otherwise;
+    ``cut``: what these leave out."""
+    stage = Room(simulation, moments or (lambda: toured(simulation, seconds)), view)
+    metadata = simulation.metadata()
     stream = Stream(
-        metadata=simulation.metadata(),
+        metadata=replace(metadata, laser=Thin(cut.beams).spec(simulation.spec)),
         frames=stage.frames,
-        length=-(-n_frames(seconds, simulation.scan_period_s) // every) * len(simulation.specs),
+        length=-(-n_frames(seconds, simulation.scan_period_s) // cut.every) * len(simulation.specs),
     )
-    made_with = {"odometry": simulation.odometry_preset, **simulation.metadata().extra}
+    made_with = {"odometry": simulation.odometry_preset, **metadata.extra}
     return Footage(
         stream=stream, stage=stage, title=title, duration_s=float(seconds),
         made_with={"simulation": made_with},
@@ -243,6 +244,8 @@ def title_of(settings: Mapping[str, Any]) -> str:
     """``office · dynamism 0.5 · seed 4``; motion, change and crowd where they are given."""
     twin = f" · {settings['twin']} twin" if settings.get("twin") else ""
     knobs = [f"{k} {settings[k]}" for k in KNOBS if settings.get(k) is not None]
+    if from_s := settings.get("cut", {}).get("from_s"):
+        twin += f" · from {from_s:g} s"
     dynamism, seed = settings.get("dynamism", 0.5), settings.get("seed", 0)
     scene = settings["scene"]
     scene = Path(scene).name if is_file(scene) else scene

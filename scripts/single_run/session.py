@@ -295,7 +295,7 @@ def _next(outputs: Outputs, show: Show) -> dict[str, str]:
         return {"Go on in this map:": command_line("run", slam=slam, log="LOG", **maps)}
     scene, scanner = settings["scene"], settings.get("laser", "full")
     then = {}
-    if not settings.get("also_at"):
+    if not {"also_at", "cut"} & {*settings}:  # of these there is no going back
         trust = is_code(slam) or is_code(scene)
         blame = command_line("blame", folder=folder, trust=trust)
         then["What misled it, if anything did:"] = blame

@@ -93,13 +93,13 @@ class Blame:
         from scripts.debugger.recording import Case, options_of
         from sim.sensors.lidar.registry import scanner_of
 
-        laser = scanner_of(self.scanner)
+        scanner_of(self.scanner)  # complains
         settings = {
             **self.moves.world(self.scene, self.seed),
             **options_of(self.scene_option or []),
         }
         if self.scanner != "full":
-            settings |= {"laser": laser}
+            settings |= {"laser": self.scanner}
         slam = self.slam or "shunting"
         return Case(settings=settings, seconds=self.seconds, slam=slam, every=self.every)
 

@@ -2,6 +2,7 @@
 """``mobilia run``: SLAMs on a recorded log or a simulated tour, scored, mapped and filmed."""
 
 from pathlib import Path
+from typing import Any
 
 from scripts import options
 from scripts.names import check, run_name, scene_name
@@ -35,6 +36,10 @@ class Run:
     scene: str | None = option(
         "Or a simulated scene, driven on a tour of its rooms.", complete=SCENES
     )
+    recipe: Path | None = option(
+        "Or a simulated run on file, made again: the folder of run, demo or shrink, an episode, or "
+        "DIR/runs/NAME.npz of a comparison."
+    )
     tour: options.Tour = part(options.Tour)
     out: Path | None = option("Folder to write; default out/run-<log or scene>.", writes=True)
     overwrite: bool = options.OVERWRITE()
@@ -50,21 +55,34 @@ class Run:
     )
     oracle: list[str] | None = options.ORACLES()
     set_: list[str] | None = options.SET()
+    trust: bool = options.TRUST()
 
     def __call__(self) -> None:
-        options.exactly_one("--log and --scene", self.log, self.scene)
+        options.exactly_one("--log, --scene and --recipe", self.log, self.scene, self.recipe)
         slams = list(options.with_oracles(options.named(self.slam), self.oracle, self.set_))
         if MAP_ORACLE in slams:
             raise InvalidValueError(
                 "--oracle map is for compare and benchmark: they know the true map"
             )
         check(slams, self.scene)
-        if self.scene is not None:
-            self._on_scene(slams, self.scene)
+        if self.recipe is not None:
+            self._on_scene(slams, run_name(self.recipe), self._made_again(self.recipe))
+        elif self.scene is not None:
+            self._on_scene(slams, scene_name(self.scene), self.tour.settings(self.scene))
         elif self.log is not None:
             self._on_log(slams, self.log)
 
-    def _on_scene(self, slams: list[str], scene: str) -> None:
+    def _made_again(self, recipe: Path) -> dict[str, Any]:
+        """The tour of a run on file, as ``on_scene`` takes it."""
+        from scripts.comparison.again import again
+
+        if self.tour != options.Tour():
+            raise InvalidValueError("--recipe says which tour it is: leave options of it out")
+        if not recipe.exists():
+            raise MissingPathError(recipe, "no such folder")
+        return again(recipe, self.trust).told()
+
+    def _on_scene(self, slams: list[str], name: str, settings: dict[str, Any]) -> None:
         for text in self.recorded.laser or ():
             options.place_of(text, "--laser")
         if self.recorded != Recorded():
@@ -77,10 +95,10 @@ class Run:
         from scripts.single_run.session import Outputs
 
         outputs = Outputs(
-            folder=self.out or Path("out") / f"run-{scene_name(scene)}", command="run",
+            folder=self.out or Path("out") / f"run-{name}", command="run",
             overwrite=self.overwrite, film=self.film,
         )  # fmt: skip
-        on_scene(slams, self.tour.settings(scene), outputs, plan_only=self.plan_only)
+        on_scene(slams, settings, outputs, plan_only=self.plan_only)
 
     def _on_log(self, slams: list[str], log: Path) -> None:
         from scripts.jobs import try_names

@@ -38,8 +38,8 @@ class Verify:
     """
 
     folder: Path = argument(
-        "A dataset, an episode, a folder of run, demo, compare, benchmark, drive or "
-        "blame, a map, or a submission to the benchmark.",
+        "A dataset, an episode, a folder of run, demo, compare, benchmark, drive, "
+        "blame or shrink, a map, or a submission to the benchmark.",
         REQUIRED,
     )
     regenerate: int = option("Simulate this many episodes again and compare.", 0)

@@ -23,7 +23,7 @@ from scenes.scene_file import located, sha256_of
 from sim.core.dynamism import Dynamism
 from sim.core.seeds import Seeds
 from sim.core.versions import WORLD, world_of
-from sim.sensors.lidar.registry import ScannerConfig, scanner_of
+from sim.sensors.lidar.registry import ScannerConfig, scanner_of, written
 from sim.sensors.odometry.config import PRESETS
 from sim.simulation import Simulation, checked_moment
 from sim.twins.twins import TWINS
@@ -161,9 +161,16 @@ class Recipe:
         """How the scanner is set."""
         if not isinstance(self.scanner, str):
             raise InvalidValueError(f"Recipe.scanner must be a name, got {self.scanner!r:.80}")
+        return scanner_of(self.scanner, **self._set_on_it())
+
+    @property
+    def laser_name(self) -> str:
+        """``laser`` in writing: ``lms221(range_mode=8m):noise``."""
+        return written(self.scanner, **self._set_on_it())
+
+    def _set_on_it(self) -> dict[str, Any]:
         own = {n: getattr(self, n) for n in ("resolution_deg", "range_mode")}
-        changed = {n: v for n, v in own.items() if v != getattr(Recipe, n)}
-        return scanner_of(self.scanner, **changed)
+        return {n: v for n, v in own.items() if v != getattr(Recipe, n)}
 
     def simulation(self) -> dict[str, Any]:
         """Arguments of ``Simulation``."""

@@ -94,15 +94,32 @@ def scanner_of(laser: str | ScannerConfig | None, **settings: Any) -> ScannerCon
     return laser
 
 
-def _named(text: str, settings: Mapping[str, Any]) -> ScannerConfig:
+def written(text: str, **settings: Any) -> str:
+    """A name in writing with these settings besides; raises as ``scanner_of``."""
+    scanner_of(text, **settings)
+    if not settings:
+        return text
+    name, inside, errors = _parts(text)
+    all_of_it = {**_settings(name, inside or ""), **settings}
+    words = ", ".join(f"{key}={value}" for key, value in all_of_it.items())
+    return f"{name}({words})" + (f":{errors}" if errors else "")
+
+
+def _parts(text: str) -> tuple[str, str | None, str | None]:
+    """Model, settings and errors of a name in writing; ``UnknownNameError`` for what is none."""
     parts = _WRITTEN.fullmatch(text.strip()) if len(text) <= MAX_TEXT else None
     if parts is None:
         raise UnknownNameError(f"no scanner is called {text!r:.80}. {_known()}")
-    name, written, errors = parts.groups()
-    if name in ERRORS and written is None and errors is None:
-        name, errors = DEFAULT, name
+    name, inside, errors = parts.groups()
+    if name in ERRORS and inside is None and errors is None:
+        return DEFAULT, None, name
+    return name, inside, errors
+
+
+def _named(text: str, settings: Mapping[str, Any]) -> ScannerConfig:
+    name, inside, errors = _parts(text)
     model = model_of(name)
-    config = _set(name, model, {**_settings(name, written or ""), **settings})
+    config = _set(name, model, {**_settings(name, inside or ""), **settings})
     if errors is not None and errors not in ERRORS:
         raise UnknownNameError(
             f"scanner {text!r}: errors must be {', '.join(ERRORS)}, got {errors!r}"
@@ -126,10 +143,10 @@ def _known() -> str:
     )
 
 
-def _settings(name: str, written: str) -> dict[str, float | str]:
+def _settings(name: str, inside: str) -> dict[str, float | str]:
     """``fov_deg=270, beams=541`` as a dictionary; whole numbers stay whole."""
     out: dict[str, float | str] = {}
-    for part in filter(None, (word.strip() for word in written.split(","))):
+    for part in filter(None, (word.strip() for word in inside.split(","))):
         key, equals, value = (word.strip() for word in part.partition("="))
         if not equals or not key or not value or key in out:
             raise InvalidValueError(f"scanner {name}: settings are NAME=VALUE, got {part!r}")

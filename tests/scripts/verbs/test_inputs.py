@@ -90,6 +90,7 @@ WAYS = [
     Way("score bag --out bag --overwrite", BAG),
     Way("blame run --out run --overwrite", "run/recipe.json"),
     Way("blame bag --out bag --overwrite", "bag/recipe.json"),
+    Way("shrink run --out run --overwrite", "run/recipe.json"),
     Way("lifelong bag --out bag --overwrite", "bag/recipe.json"),
     Way("sensor-card --log out.log --out out.log", "out.log", copied("a.log.gz", "out.log")),
     Way("generate lab.toml --out lab.toml", "lab.toml", copied("lab.yaml", "lab.toml")),

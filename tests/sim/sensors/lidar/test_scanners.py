@@ -13,7 +13,7 @@ import pytest
 from sim.sensors.lidar import registry
 from sim.sensors.lidar.device import LaserScanner
 from sim.sensors.lidar.models.lms221 import Lms221Config
-from sim.sensors.lidar.registry import scanner_of
+from sim.sensors.lidar.registry import scanner_of, written
 from sim.sensors.lidar.scanner import Scanner
 from sim.simulation import Simulation, stream, tour
 from slam.errors import InvalidValueError, UnknownNameError
@@ -182,6 +182,20 @@ def test_what_is_no_scanner_is_refused_with_what_there_is(text: str, message: st
 
 
 PAGE = Path(__file__).parents[4] / "docs" / "scanners.md"
+
+
+@pytest.mark.parametrize(
+    ("text", "settings", "name"),
+    [
+        ("full", {}, "full"),
+        ("noise", {"range_mode": "8m"}, "lms221(range_mode=8m):noise"),
+        ("lms221(range_mode=8m)", {"resolution_deg": 1.0},
+         "lms221(range_mode=8m, resolution_deg=1.0)"),
+    ],
+)  # fmt: skip
+def test_settings_are_written_into_a_name(text: str, settings: dict, name: str) -> None:
+    assert written(text, **settings) == name
+    assert scanner_of(name) == scanner_of(text, **settings)
 
 
 def test_a_model_from_a_folder_outside_simulates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
