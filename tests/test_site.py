@@ -113,11 +113,6 @@ def test_the_commands_are_commands(page: str):
     assert others <= {"make", "source", "python"}
 
 
-def test_the_code_of_a_job_is_that_of_a_page_whose_code_is_run():
-    run = blocks("extending.md", "xml")[0], blocks("extending.md", "python")[0]
-    assert (*blocks("jobs/my_scene.md", "xml"), *blocks("jobs/my_scene.md", "python")) == run
-
-
 @pytest.mark.parametrize("block", range(3))
 def test_the_policy_blocks_run(block: int, capsys: pytest.CaptureFixture[str]):
     exec(blocks("jobs/my_policy.md", "python")[block].replace("range(100)", "range(10)"), {})

@@ -2,9 +2,9 @@
 """Fill the pages from the runs that ship: ``python -m scripts.benchmark.publish [out/days]``.
 
 Each number of the benchmark on a page stands between marks, and all of them are filled here: in
-README.md one sentence, in docs/benchmark.md the tracks and the ranking, in docs/leaderboard.md what
-was lost at the top of each track, and the days. docs/pictures gets both as pictures, docs/results
-every run as CSV, and the folder of ``scripts.benchmark.days`` as ``days.json`` and ``days.csv``.
+README.md one sentence, in docs/benchmark.md the tracks and the ranking, in docs/leaderboard.md the
+days. docs/pictures gets what was lost, by track and by level, docs/results every run as CSV,
+and the folder of ``scripts.benchmark.days`` as ``days.json`` and ``days.csv``.
 """
 
 import argparse
@@ -24,7 +24,6 @@ from scripts.comparison.tables import write_csv
 from scripts.console import ended
 from scripts.days.scores import LEVEL_COLUMNS, levels
 from scripts.marks import fill_page, table
-from scripts.pages.table import NONE
 from scripts.result_files import RESULTS, ROOT
 from slam.files import write_text
 from slam.system import OWN
@@ -105,19 +104,6 @@ def at_the_top(of: Results) -> dict[str, dict[str, tuple[int, int]]]:
     return found
 
 
-def top_table(of: Results) -> str:
-    """A row for each track, a column for each SLAM."""
-    lost = at_the_top(of)
-    ranked = [row["slam"] for row in board_of(of).ranking]
-    there = {slam for own in lost.values() for slam in own}
-    slams = sorted(there, key=lambda slam: ranked.index(slam) if slam in ranked else len(ranked))
-    lines = [
-        [track, *("{} of {}".format(*own[s]) if s in own else NONE for s in slams)]
-        for track, own in lost.items()
-    ]
-    return table(["track", *slams], lines)
-
-
 def runs_table(of: Results) -> list[Row]:
     """A row for each run and SLAM of the file that ships."""
     return [
@@ -150,7 +136,6 @@ def blocks(of: Results, aged: Sequence[Mapping[str, Any]]) -> list[tuple[str, st
         (FRONT, "benchmark", in_a_sentence(of)),
         (PAGE, "tracks", tracks_table(list(newest().values()))),
         (PAGE, "shipped", shipped(of)),
-        (BOARD, "top", top_table(of)),
         (BOARD, "days", f"{days.section(aged, tables=False)}\n\n{_DAYS}"),
     ]
 

@@ -4,10 +4,12 @@
 A reader's SLAM gets a row between the others on the same recordings, without running the others.
 
     python -m scripts.benchmark.published out/top --levels 1 --seeds 10 --run shunting karto
+    python -m scripts.benchmark.published out/low --levels 0 0.25 0.5 0.75 --seeds 3 --run shunting
     python -m scripts.benchmark.published out/low out/top --commit HASH   # writes published.json
     python -m scripts.benchmark.published scripts/benchmark/published.json out/more --commit HASH
 
-The first goes on where it was stopped. The last adds to a file of that commit: all rows are of one.
+The first two go on where they were stopped. The last adds to a file of that commit: all rows are
+of one.
 """
 
 import argparse

@@ -20,7 +20,8 @@ from slam.files import write_text
 from slam.names import is_code
 
 REPORT = "report.html"
-ANSWERED = ("finished", "lost")  # how a run ends in which nothing failed
+LOST = ("lost",)
+ANSWERED = ("finished", *LOST)  # how a run ends in which nothing failed
 
 
 def write(study: Study) -> Path:
@@ -87,11 +88,11 @@ def _standings(study: Study) -> list[answer.Standing]:
     return [answer.standing(runs, study.subject, scene, study.axis) for scene in study.scenes]
 
 
-def blame_command(study: Study, row: dict[str, Any], folder: str = "FOLDER") -> str:
-    """What to type to learn which mover misled the SLAM of a row; ``folder``: the comparison's."""
+def command_for(verb: str, study: Study, row: dict[str, Any], folder: str = "FOLDER") -> str:
+    """``blame`` or ``shrink`` of the run of a row; ``folder``: the comparison's."""
     run = Run(scene=row["scene"], dynamism=row["dynamism"], seed=int(row["seed"]), axis=study.axis)
     path, trust = f"{folder}/runs/{run.name}.npz", is_code(run.scene)
-    return command_line("blame", folder=path, slam=row["slam"], trust=trust)
+    return command_line(verb, folder=path, slam=row["slam"], trust=trust)
 
 
 def _levels(study: Study, section: Section) -> list[tuple[str, list[Table]]]:
@@ -114,7 +115,8 @@ def _scene(study: Study, scene: str) -> dict[str, Any]:
         "maps": [maps[0], *sorted(maps[1:], key=lambda panel: panel[0] != subject)],
         "table": tables.worst(study, scene),
         "worst": worst[0],
-        "blame": [blame_command(study, row) for row in study.worst(scene, subject, ANSWERED)],
+        "blame": [command_for("blame", study, r) for r in study.worst(scene, subject, ANSWERED)],
+        "shrink": [command_for("shrink", study, r) for r in study.worst(scene, subject, LOST)[:1]],
         "said": _worst_in_words(worst[0], study.axis),
         "errors": pictures.errors(run, study.slams),
         "strip": pictures.strip(run, subject, study.slams),
@@ -131,12 +133,12 @@ def _worst_in_words(row: dict[str, Any], axis: str) -> str:
     return words + "."
 
 
-def blame_worst(study: Study) -> list[str]:
+def for_worst(verb: str, study: Study) -> list[str]:
     """The command for the worst lost run of the subject in each scene."""
     return [
-        blame_command(study, row, str(study.compared.folder))
+        command_for(verb, study, row, str(study.compared.folder))
         for scene in study.scenes
-        for row in study.worst(scene, study.subject, ("lost",))[:1]
+        for row in study.worst(scene, study.subject, LOST)[:1]
     ]
 
 

@@ -26,7 +26,7 @@ from scripts.film.render import Liveliest, shoot, watched
 from scripts.film.show import Show
 from scripts.live.replay import Recorder
 from scripts.machine import machine
-from scripts.metrics.judged import in_first_frame, moved
+from scripts.metrics.judged import Judged, in_first_frame, moved
 from scripts.names import file_name, scene_name
 from scripts.output import write_recipe
 from scripts.pages import page as pages
@@ -297,8 +297,10 @@ def _next(outputs: Outputs, show: Show) -> dict[str, str]:
     then = {}
     if not {"also_at", "cut"} & {*settings}:  # of these there is no going back
         trust = is_code(slam) or is_code(scene)
-        blame = command_line("blame", folder=folder, trust=trust)
-        then["What misled it, if anything did:"] = blame
+        then["What misled it, if anything did:"] = command_line("blame", folder=folder, trust=trust)
+        if Judged.of(show.track(), show.replay.truth()).lost_s is not None:
+            short = command_line("shrink", folder=folder, trust=trust)
+            then["In how little of this run is it lost again?"] = short
     then["From how much motion on is it lost?"] = command_line(
         "compare", slam=slam, scene=scene, dynamism="0:1:0.5", seeds=6,
         scanner=None if scanner == "full" else scanner, out=f"out/compare-{scene_name(scene)}",

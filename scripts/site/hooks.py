@@ -27,6 +27,8 @@ OF_CODE, OF_JOBS = 0.2, 2.0  # weights of pages in a search; set by hand
 INSTEAD = {"README.md": "index.md", "docs/results": RESULTS, **OUTSIDE}  # which page shows what
 _LINK = re.compile(r"(?<=\]\()([^)\s#]+)")
 _CLIP = re.compile(r'<a href="([^"]+\.mp4)"><img alt="([^"]*)" src="([^"]+)" ?/?></a>')
+_CODE = re.compile(r"<code.*?</code>", re.DOTALL)
+_OPTION = re.compile(r"(?<![\w-])--[a-z][\w-]*")
 _VIDEO = (  # a click or Enter plays it; until then nothing covers the picture but a sign (site.css)
     r'<span class="clip"><video muted loop playsinline preload="none" tabindex="0" '
     r'onclick="this.controls=true;this.play();this.onclick=null" '
@@ -69,7 +71,7 @@ def on_page_markdown(markdown: str, *, page: "Page", config: "MkDocsConfig", fil
 
 def on_page_content(html: str, *, page: "Page", config: "MkDocsConfig", files: "Files") -> str:
     """A picture that links to a clip becomes the clip, with the picture until it is played; where
-    there is a page to turn of the same, a link to it follows."""
+    there is a page to turn of the same, a link to it follows. No line ends within ``--option``."""
     del config, files
 
     def turned(clip: re.Match[str]) -> str:
@@ -79,7 +81,10 @@ def on_page_content(html: str, *, page: "Page", config: "MkDocsConfig", files: "
         to = posixpath.relpath(f"replays/{name}", posixpath.dirname(page.url) or ".")
         return f'{clip.expand(_VIDEO)}<br><a href="{to}">Turn it, scrub it</a>'
 
-    return _CLIP.sub(turned, html)
+    def whole(code: re.Match[str]) -> str:
+        return _OPTION.sub(r'<span class="option">\g<0></span>', code[0])
+
+    return _CLIP.sub(turned, _CODE.sub(whole, html))
 
 
 def on_post_build(*, config: "MkDocsConfig") -> None:

@@ -43,8 +43,9 @@ class Report:
                 fact(line, bad=True)
             for line in page.answers(about):
                 fact(line)
-            for line in page.blame_worst(about):
-                say(f"What misled it: [bold]{escape(line)}[/bold]", highlight=False)
+            for verb, what in (("blame", "What misled it"), ("shrink", "In how little of the run")):
+                for line in page.for_worst(verb, about):
+                    say(f"{what}: [bold]{escape(line)}[/bold]", highlight=False)
             if self.replays:
                 with working("replaying the worst runs"):
                     made = _replays(about)

@@ -129,6 +129,19 @@ def test_the_page_is_about_whom_one_asks(written: Path, tmp_path: Path):
     assert "`own:Hanging` failed in room in 0 of 6 at dynamism 0 and 6 of 6 at 1" in done.output
 
 
+def test_of_the_worst_lost_run_both_debuggers_are_offered(tmp_path: Path):
+    folder = made.make(tmp_path / "compare")
+    lost = {"outcome": "lost", "lost": 1, "lost_at_s": 1.0}
+    rows = [row | (lost if row["slam"] == made.OURS else {}) for row in files.read(folder).runs]
+    made.write_tables(folder, rows)
+    done = CliRunner().invoke(cli.app, ["report", str(folder)], catch_exceptions=False)
+    text = (folder / page.REPORT).read_text(encoding="utf-8")
+    for verb in ("blame", "shrink"):
+        command = f"mobilia {verb} %s/runs/room_d1_s105.npz --slam shunting"
+        assert command % "FOLDER" in text
+        assert command % folder in "".join(done.output.splitlines())
+
+
 class Addresses(HTMLParser):
     """Everything that a page would fetch; and tags left open."""
 

@@ -181,7 +181,7 @@ def test_what_is_no_scanner_is_refused_with_what_there_is(text: str, message: st
         scanner_of(text)
 
 
-PAGE = Path(__file__).parents[4] / "docs" / "scanners.md"
+PAGE = Path(__file__).parents[4] / "docs" / "extending.md"
 
 
 @pytest.mark.parametrize(
@@ -200,7 +200,7 @@ def test_settings_are_written_into_a_name(text: str, settings: dict, name: str) 
 
 def test_a_model_from_a_folder_outside_simulates(tmp_path: Path, monkeypatch: pytest.MonkeyPatch):
     """The file that the page shows, and the same with beams that are all measured at once."""
-    code = PAGE.read_text().split("```python\n")[1].split("```")[0]
+    code = PAGE.read_text().split("## Scanner\n")[1].split("```python\n")[1].split("```")[0]
     flash = "range_max_m=20.0, beam_times_s=(0.5 / rate_hz,) * 181,"
     for name, text in (
         ("lab_lidar", code),
