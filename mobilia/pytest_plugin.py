@@ -42,7 +42,7 @@ def pytest_generate_tests(metafunc: pytest.Metafunc) -> None:
 
     runs, wrong = [], ""
     try:
-        runs = asked(*(mark.args if mark else ()), **(mark.kwargs if mark else {}))
+        runs = asked(mark.args, mark.kwargs) if mark else asked((), {})
     except MobiliaError as error:
         wrong = f"{metafunc.definition.nodeid}: {error}"
     if wrong:  # not while the error is handled, which pytest would print too

@@ -5,7 +5,7 @@ The recordings are a cache. A SLAM runs anew each time: what it is made of, a li
 all known to us.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 from pathlib import Path
@@ -121,7 +121,7 @@ def _ran(item: tuple[int, Job, Path, str]) -> tuple[int, str, Row]:
 
 def carried_out(
     runs: Sequence[One], slam: str, out: Path, **ways: Any
-) -> Iterator[tuple[One, str, Row]]:
+) -> Generator[tuple[One, str, Row]]:
     """Each run in its order, with the digest of its recording and its row; who has seen enough of
     them stops. ``ways`` as ``scripts.workers.each`` has them.
 

@@ -44,8 +44,9 @@ class Tuned:
         """Sentences, the result first."""
         n, stopped = len(self.trials) - 1, sum(one.stopped for one in self.trials)
         first, of = self.trials[0], self.task.seeds
+        at_most = f" of {self.task.trials}" if self.task.trials else ""
         searched = (
-            f"{n} trials on {of} training seeds, {stopped} of them stopped early: lost in "
+            f"{n}{at_most} trials on {of} training seeds, {stopped} of them stopped early: lost in "
             f"{self.best.lost} of {of} instead of {first.lost}."
         )
         if self.verdict is None:
@@ -128,10 +129,11 @@ def picture(path: Path, tuned: Tuned) -> None:
     words = f"as it was: lost {first.lost} of {of}"
     ax.axhline(first.value, color=MUTED, lw=1.0, ls="--", label=words)
     place = (tuned.trials.index(last), last.value)
-    ax.annotate(f"lost {last.lost} of {of}", place, xytext=(0, -14), textcoords="offset points",
+    ax.annotate(f"lost {last.lost} of {of}", place, xytext=(0, 7), textcoords="offset points",
                 ha="center", color=INK)  # fmt: skip
     ax.set(xlabel="trial", ylabel="score on the training seeds\n(m if held, 1 to 2 if lost)",
            title=f"{task.slam}: {task.track.name} at level {task.level:g}")  # fmt: skip
     ax.set_ylim(bottom=0.0)
+    ax.locator_params(axis="x", integer=True)
     ax.legend(frameon=False, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.2))
     save(figure, path)
