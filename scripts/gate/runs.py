@@ -138,14 +138,10 @@ def carried_out(
             bar.update(task, completed=len(done), unit=f"{len(done)}/{len(runs)}")
             while given in done:  # in order, whatever the workers do: the verdict hangs on it
                 given += 1
-                if given == min(FIRST, len(runs)):
-                    _check_first([done[k][1] for k in range(given)])
+                failed = [row["failure"] for _, row in (done[k] for k in range(given))]
+                if given == min(FIRST, len(runs)) and all(failed):
+                    raise SlamFailedError(str(failed[0]))
                 yield runs[given - 1], *done[given - 1]
-
-
-def _check_first(rows: Sequence[Row]) -> None:
-    if all(row["failure"] for row in rows):
-        raise SlamFailedError(str(rows[0]["failure"]))
 
 
 def results_of(slam: str, seconds: float, made: Sequence[tuple[One, str, Row]]) -> Results:

@@ -101,16 +101,12 @@ class Paired:
 
     def _row(self, track: str) -> list[Cell]:
         own = [(before, now) for one, before, now in self.pairs if one.track == track]
-        lost = _cell(*(str(sum(row["lost"] for row in rows)) for rows in zip(*own, strict=True)))
         held = [pair for pair in own if not any(row["lost"] for row in pair)]
-        before, now = ([pair[k] for pair in held] for k in (0, 1))
-        errors = [_cell(_middle(before, key), _middle(now, key)) for key in ERRORS]
+        both = [[str(sum(pair[k]["lost"] for pair in own)) for k in (0, 1)]]
+        both += [[_middle([pair[k] for pair in held], key) for k in (0, 1)] for key in ERRORS]
+        cells = [Cell(text=now, small=before) for before, now in both]
         times = _times([change(*pair) for pair in own])
-        return [Cell(text=track), Cell(text=str(len(own))), lost, *errors, Cell(text=times)]
-
-
-def _cell(before: str, now: str) -> Cell:
-    return Cell(text=now, small=before)
+        return [Cell(text=track), Cell(text=str(len(own))), *cells, Cell(text=times)]
 
 
 def _middle(rows: Sequence[Row], key: str) -> str:
