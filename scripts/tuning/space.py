@@ -43,12 +43,10 @@ class Searched(Table, frozen=True, omit_defaults=True):
     def ends(self) -> tuple[Any, ...]:
         """Both bounds, or all choices; ``InvalidValueError`` for what is neither."""
         low, high = self.low, self.high
-        if self.choices is not None:
-            if (low, high, self.log, self.whole) != (None, None, False, False):
-                raise InvalidValueError("has choices or low and high, not both")
+        if self.choices is not None and self == Searched(choices=self.choices):
             return tuple(self.choices)
-        if low is None or high is None:
-            raise InvalidValueError("needs low and high, or choices")
+        if self.choices is not None or low is None or high is None:
+            raise InvalidValueError("needs low and high, or choices alone")
         if not low < high:
             raise InvalidValueError(f"low must be below high, got {low:g} and {high:g}")
         if self.log and low <= 0.0:

@@ -48,7 +48,7 @@ def test_paths_may_be_nested_as_toml_nests_them(tmp_path: Path):
         ("karto", "numbers = {keep_m = {low = 0.1, high = nan}}", "a finite number"),
         ("kiss-icp", "numbers = {max_points_per_voxel = {low = 1, high = 9}}", "a whole number"),
         ("karto", "numbers = {keep_m = {choices = [1], low = 1}}", "a list of 2 to 100 values"),
-        ("karto", "numbers = {keep_m = {choices = [1, 2], low = 1}}", "not both"),
+        ("karto", "numbers = {keep_m = {choices = [1, 2], low = 1}}", "choices alone"),
         ("shunting", 'numbers = {objective = {choices = ["sum", "a,b"]}}', "matches"),
         ("odometry", "numbers = {gain = {low = 1, high = 2}}", "'odometry' has no numbers to set"),
         ("pipe:x", 'numbers = {"a b" = {low = 1, high = 2}}', "no name of an environment variable"),
