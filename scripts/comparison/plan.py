@@ -200,11 +200,11 @@ class Plan(Asked):
             for run in self.runs()
         }
 
-    def entries(self) -> Iterator[tuple[Run, str, Job]]:
-        """The jobs that run a SLAM over a recording: run, SLAM, job."""
+    def entries(self, call: Callable[..., None] = entry.enter) -> Iterator[tuple[Run, str, Job]]:
+        """The jobs that run a SLAM over a recording, by ``call``: run, SLAM, job."""
         recordings = {name: job.file_name() for name, job in self.recordings().items()}
         for name in self.slams:
-            job = running(entry.enter, name, self.scan_limit_s)
+            job = running(call, name, self.scan_limit_s)
             for run in self.runs():
                 own: dict[str, Any] = {"recording": f"{RECORDINGS}/{recordings[run.name]}"}
                 own |= {} if self.judge_maps else {"judge_maps": False}

@@ -13,6 +13,7 @@ import random
 import sys
 from collections import Counter
 from collections.abc import Mapping, Sequence
+from itertools import product
 from pathlib import Path
 from statistics import mean
 from typing import Any
@@ -22,7 +23,7 @@ from scripts.comparison import recording
 from scripts.comparison.entry import scored
 from scripts.comparison.plan import RECORDINGS
 from scripts.console import ended
-from scripts.gate.evidence import ERRORS, LEAST, change, verdict_of
+from scripts.gate.evidence import change, verdict_of
 from scripts.gate.runs import One, of_tracks, recorded
 from scripts.imports import source_of, sources
 from scripts.jobs import Job, run_jobs
@@ -86,16 +87,9 @@ def trial(before: Pool, now: Pool, draws: random.Random) -> tuple[str, int]:
 
 def times(before: Pool, now: Pool) -> float:
     """Geometric mean of how many times the error, over the recordings, of runs that hold."""
-    logs = []
-    for a, b in zip(before, now, strict=True):
-        sizes = [[_log(row) for row in rows if not row["lost"]] for rows in (a, b)]
-        if all(sizes):
-            logs.append(mean(sizes[1]) - mean(sizes[0]))
-    return math.exp(mean(logs))
-
-
-def _log(row: Row) -> float:
-    return mean(math.log(max(row[key], LEAST)) for key in ERRORS)
+    pairs = (pair for both in zip(before, now, strict=True) for pair in product(*both))
+    changes = [value for a, b in pairs if (value := change(a, b)) is not None]
+    return math.exp(mean(filter(math.isfinite, changes)))
 
 
 def row_of(name: str, now: str, pair: tuple[Pool, Pool], trials: int) -> list[str]:

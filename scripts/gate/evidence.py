@@ -13,7 +13,6 @@ one as well. The same holds for the opposite claim, with ln(1 + ``WORSE``) taken
 
 import math
 from collections.abc import Mapping, Sequence
-from dataclasses import dataclass, field
 from statistics import mean
 from typing import Any, Literal
 
@@ -40,55 +39,39 @@ def change(before: Mapping[str, Any], now: Mapping[str, Any]) -> float | None:
     return mean(logs) if logs else None
 
 
+def against_unchanged(changes: Sequence[float]) -> float:
+    """E of these runs against "nothing changed"."""
+    return mean(math.prod(_bet(bet, value) for value in changes) for bet in BETS)
+
+
+def against_larger(changes: Sequence[float]) -> float:
+    """E against "errors are larger by ``WORSE``"."""
+    return against_unchanged([math.log1p(WORSE) - value for value in changes])
+
+
+def against_lost(changes: Sequence[float]) -> float:
+    """E against "of the runs held before a share of ``WORSE`` is newly lost"."""
+    lost, newly_held = changes.count(math.inf), changes.count(-math.inf)
+    held = len(changes) - lost - newly_held
+    return mean((p / WORSE) ** lost * ((1.0 - p) / (1.0 - WORSE)) ** held for p in LOST_BETS)
+
+
 def _bet(bet: float, value: float) -> float:
     return 1.0 + math.tanh(bet * max(-MOST, min(MOST, value)))
 
 
-@dataclass(eq=False)
-class Evidence:
-    """What the runs so far say; each list has an E for each bet.
-
-    changes  as of ``change``, those that are None left out
-    worse    against "nothing changed"
-    alike    against "errors are larger by ``WORSE``"
-    held     against "a share of ``WORSE`` of the runs is newly lost"
-    """
-
-    changes: list[float] = field(default_factory=list)
-    worse: list[float] = field(default_factory=lambda: [1.0] * len(BETS))
-    alike: list[float] = field(default_factory=lambda: [1.0] * len(BETS))
-    held: list[float] = field(default_factory=lambda: [1.0] * len(LOST_BETS))
-
-    def add(self, value: float | None) -> None:
-        """One more run."""
-        if value is None:
-            return
-        self.changes.append(value)
-        for k, bet in enumerate(BETS):
-            self.worse[k] *= _bet(bet, value)
-            self.alike[k] *= _bet(bet, math.log1p(WORSE) - value)
-        for k, share in enumerate(LOST_BETS if value > -math.inf else ()):
-            self.held[k] *= share / WORSE if value == math.inf else (1.0 - share) / (1.0 - WORSE)
-
-    @property
-    def verdict(self) -> Verdict:
-        """What is sure by now."""
-        if mean(self.worse) >= 1.0 / WRONG:
-            return "worse"
-        sure = min(mean(self.alike), mean(self.held)) >= 1.0 / WRONG
-        return "not worse" if sure else "undecided"
-
-    @property
-    def newly(self) -> tuple[int, int]:
-        """Runs newly lost, and newly held."""
-        return self.changes.count(math.inf), self.changes.count(-math.inf)
+def verdict(changes: Sequence[float | None]) -> Verdict:
+    """What is sure after these runs; None tells nothing."""
+    told = [value for value in changes if value is not None]
+    if against_unchanged(told) >= 1.0 / WRONG:
+        return "worse"
+    sure = min(against_larger(told), against_lost(told)) >= 1.0 / WRONG
+    return "not worse" if sure else "undecided"
 
 
 def verdict_of(changes: Sequence[float | None]) -> tuple[Verdict, int]:
     """Of runs in their order: the first verdict that is sure, and after how many."""
-    evidence = Evidence()
-    for k, value in enumerate(changes, 1):
-        evidence.add(value)
-        if evidence.verdict != "undecided":
-            return evidence.verdict, k
+    for k in range(1, len(changes) + 1):
+        if (sure := verdict(changes[:k])) != "undecided":
+            return sure, k
     return "undecided", len(changes)

@@ -5,7 +5,7 @@ The recordings are a cache. A SLAM runs anew each time: what it is made of, a li
 all known to us.
 """
 
-from collections.abc import Iterator, Sequence
+from collections.abc import Generator, Sequence
 from dataclasses import dataclass, replace
 from itertools import chain, zip_longest
 from pathlib import Path
@@ -121,7 +121,7 @@ def _ran(item: tuple[int, Job, Path, str]) -> tuple[int, str, Row]:
 
 def carried_out(
     runs: Sequence[One], slam: str, out: Path, **ways: Any
-) -> Iterator[tuple[One, str, Row]]:
+) -> Generator[tuple[One, str, Row]]:
     """Each run in its order, with the digest of its recording and its row; who has seen enough of
     them stops. ``ways`` as ``scripts.workers.each`` has them.
 
@@ -138,14 +138,10 @@ def carried_out(
             bar.update(task, completed=len(done), unit=f"{len(done)}/{len(runs)}")
             while given in done:  # in order, whatever the workers do: the verdict hangs on it
                 given += 1
-                if given == min(FIRST, len(runs)):
-                    _check_first([done[k][1] for k in range(given)])
+                failed = [row["failure"] for _, row in (done[k] for k in range(given))]
+                if given == min(FIRST, len(runs)) and all(failed):
+                    raise SlamFailedError(str(failed[0]))
                 yield runs[given - 1], *done[given - 1]
-
-
-def _check_first(rows: Sequence[Row]) -> None:
-    if all(row["failure"] for row in rows):
-        raise SlamFailedError(str(rows[0]["failure"]))
 
 
 def results_of(slam: str, seconds: float, made: Sequence[tuple[One, str, Row]]) -> Results:

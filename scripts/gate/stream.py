@@ -1,44 +1,39 @@
 # SPDX-License-Identifier: Apache-2.0
 """A recording of a track for a test: its frames, and what a SLAM makes of them."""
 
-import inspect
-from collections.abc import Iterator
+from collections.abc import Iterator, Mapping, Sequence
 from dataclasses import dataclass
 from functools import cached_property
 from pathlib import Path
-from typing import Any
+from typing import Annotated, Any
+
+from msgspec import Meta
 
 from scripts.comparison import recording
 from scripts.comparison.entry import scored
 from scripts.gate.runs import LEVEL, SECONDS, One, of_tracks, recorded
-from slam.errors import InvalidValueError
 from slam.frames import Frame
 from slam.oracle import shown
 from slam.replay import Track
-from slam.shaped import instance, whole, within
+from slam.shaped import Share, Table, shaped
 from slam.system import SlamSystem
 from slam.trajectory import Trajectory
 
-LONGEST_S = 600.0
+
+class Mark(Table, frozen=True):
+    """What the mark takes: a track, by name; a level; how many seeds; s of each run."""
+
+    track: str
+    level: Share = LEVEL
+    seeds: Annotated[int, Meta(ge=1, le=1000)] = 1
+    seconds: Annotated[float, Meta(ge=2.0, le=600.0)] = SECONDS
 
 
-def asked(*words: Any, **given: Any) -> list[One]:
-    """The runs of a mark, as ``of_mark`` takes it; all that is wrong is a ``MobiliaError``."""
-    try:
-        inspect.signature(of_mark).bind(*words, **given)
-    except TypeError as error:
-        raise InvalidValueError(f"mobilia(track, level, seeds, seconds): {error}") from error
-    return of_mark(*words, **given)
-
-
-def of_mark(
-    track: str, level: float = LEVEL, seeds: int = 1, seconds: float = SECONDS
-) -> list[One]:
-    """A track, by name; a level of it; how many of its seeds; s of each run."""
-    instance("mobilia(track)", track, str)
-    within("mobilia(level)", level, 0.0, 1.0)
-    whole("mobilia(seeds)", seeds, 1, 1000)
-    return of_tracks((track,), level, seeds, within("mobilia(seconds)", seconds, 2.0, LONGEST_S))
+def asked(words: Sequence[Any], given: Mapping[str, Any]) -> list[One]:
+    """The runs of a mark with these arguments; all that is wrong is a ``MobiliaError``."""
+    names = (*Mark.__struct_fields__, *map(repr, words[len(Mark.__struct_fields__) :]))
+    mark = shaped("mobilia", {**dict(zip(names, words, strict=False)), **given}, Mark)
+    return of_tracks((mark.track,), mark.level, mark.seeds, mark.seconds)
 
 
 @dataclass(frozen=True, kw_only=True)

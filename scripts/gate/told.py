@@ -8,7 +8,7 @@ from statistics import mean
 from xml.etree import ElementTree
 
 from scripts.benchmark.runs_file import Row
-from scripts.gate.evidence import ERRORS, LEAST, WORSE, WRONG, Evidence, Verdict, change
+from scripts.gate.evidence import ERRORS, LEAST, WORSE, WRONG, Verdict, change, verdict
 from scripts.gate.runs import One
 from scripts.pages.table import NONE, Cell, Table
 
@@ -23,28 +23,29 @@ class Paired:
 
     slam, against  its name, and that of the file
     total          runs that there are at most
+    pairs, changes  of each run so far its rows, and ``scripts.gate.evidence.change``
     """
 
     slam: str
     against: str
     total: int
     pairs: list[Pair] = field(default_factory=list)
-    evidence: Evidence = field(default_factory=Evidence)
+    changes: list[float | None] = field(default_factory=list)
 
     def add(self, one: One, before: Row, now: Row) -> None:
         """One more run."""
         self.pairs.append((one, before, now))
-        self.evidence.add(change(before, now))
+        self.changes.append(change(before, now))
 
     @property
     def verdict(self) -> Verdict:
         """What is sure by now."""
-        return self.evidence.verdict
+        return verdict(self.changes)
 
     def said(self) -> list[str]:
         """The verdict, what it rests on, and the first failure."""
-        lost, held = self.evidence.newly
-        ratio = _times(self.evidence.changes)
+        lost, held = (self.changes.count(end) for end in (math.inf, -math.inf))
+        ratio = _times(self.changes)
         facts = f"{lost} newly lost, {held} newly held, {len(self.pairs)} of {self.total} runs"
         fifth = f"{100.0 * WORSE:.0f} %"
         first, more = {
@@ -56,7 +57,7 @@ class Paired:
             "undecided": (
                 "is undecided against",
                 f"Neither that it is worse nor that it is not by {fifth} is sure: save more "
-                "--seeds, or another --level.",
+                "--tracks or --seeds, or another --level.",
             ),
         }[self.verdict]
         failed = [str(now["failure"]) for _, _, now in self.pairs if now["failure"]]
@@ -65,8 +66,9 @@ class Paired:
 
     def worst(self) -> One | None:
         """The run that got worse most; None where none did."""
-        told = [(value, one) for one, value in self._changes() if value is not None and value > 0.0]
-        return max(told, key=lambda pair: pair[0])[1] if told else None
+        told = zip((value or 0.0 for value in self.changes), self.pairs, strict=True)
+        value, pair = max(told, key=lambda one: one[0], default=(0.0, None))
+        return pair[0] if pair is not None and value > 0.0 else None
 
     def table(self) -> Table:
         """A row for each track."""
@@ -97,21 +99,14 @@ class Paired:
         ElementTree.indent(suite)
         return ElementTree.tostring(suite, encoding="unicode", xml_declaration=True) + "\n"
 
-    def _changes(self) -> list[tuple[One, float | None]]:
-        return [(one, change(before, now)) for one, before, now in self.pairs]
-
     def _row(self, track: str) -> list[Cell]:
         own = [(before, now) for one, before, now in self.pairs if one.track == track]
-        lost = _cell(*(str(sum(row["lost"] for row in rows)) for rows in zip(*own, strict=True)))
         held = [pair for pair in own if not any(row["lost"] for row in pair)]
-        before, now = ([pair[k] for pair in held] for k in (0, 1))
-        errors = [_cell(_middle(before, key), _middle(now, key)) for key in ERRORS]
-        times = _times([value for one, value in self._changes() if one.track == track])
-        return [Cell(text=track), Cell(text=str(len(own))), lost, *errors, Cell(text=times)]
-
-
-def _cell(before: str, now: str) -> Cell:
-    return Cell(text=now, small=before)
+        both = [[str(sum(pair[k]["lost"] for pair in own)) for k in (0, 1)]]
+        both += [[_middle([pair[k] for pair in held], key) for k in (0, 1)] for key in ERRORS]
+        cells = [Cell(text=now, small=before) for before, now in both]
+        times = _times([change(*pair) for pair in own])
+        return [Cell(text=track), Cell(text=str(len(own))), *cells, Cell(text=times)]
 
 
 def _middle(rows: Sequence[Row], key: str) -> str:

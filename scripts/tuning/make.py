@@ -44,16 +44,18 @@ class Tuned:
         """Sentences, the result first."""
         n, stopped = len(self.trials) - 1, sum(one.stopped for one in self.trials)
         first, of = self.trials[0], self.task.seeds
+        at_most = f" of {self.task.trials}" if self.task.trials else ""
         searched = (
-            f"{n} trials on {of} training seeds, {stopped} of them stopped early: lost in "
+            f"{n}{at_most} trials on {of} training seeds, {stopped} of them stopped early: lost in "
             f"{self.best.lost} of {of} instead of {first.lost}."
         )
         if self.verdict is None:
             none = "fitted into the time" if n == 0 else "was better on the training seeds"
             return [f"No gain: no trial {none}.", *([searched] if n else [])]
         (before, after), alone = self.verdict.ms, self.verdict.odometry_lost
+        was = f", before {before:.1f}" if math.isfinite(before) else ""  # it failed in all runs
         control = f"Odometry alone is lost in {alone} of {self.verdict.runs}."
-        cost = f"A scan takes {after:.1f} ms, before {before:.1f}."
+        cost = f"A scan takes {after:.1f} ms{was}."
         return [self.verdict.sentence, searched, control, cost]
 
 
@@ -127,11 +129,13 @@ def picture(path: Path, tuned: Tuned) -> None:
     first, task, last = tuned.trials[0], tuned.task, tuned.best
     words = f"as it was: lost {first.lost} of {of}"
     ax.axhline(first.value, color=MUTED, lw=1.0, ls="--", label=words)
-    place = (tuned.trials.index(last), last.value)
-    ax.annotate(f"lost {last.lost} of {of}", place, xytext=(0, -14), textcoords="offset points",
-                ha="center", color=INK)  # fmt: skip
+    at = tuned.trials.index(last)
+    side, ha = (6, "left") if 2 * at < len(steps) else (-6, "right")
+    ax.annotate(f"lost {last.lost} of {of}", (at, last.value), xytext=(side, 6), ha=ha,
+                textcoords="offset points", color=INK)  # fmt: skip
     ax.set(xlabel="trial", ylabel="score on the training seeds\n(m if held, 1 to 2 if lost)",
            title=f"{task.slam}: {task.track.name} at level {task.level:g}")  # fmt: skip
     ax.set_ylim(bottom=0.0)
+    ax.locator_params(axis="x", integer=True)
     ax.legend(frameon=False, ncols=2, loc="upper center", bbox_to_anchor=(0.5, -0.2))
     save(figure, path)

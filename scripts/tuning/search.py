@@ -10,6 +10,7 @@ import math
 import time
 import warnings
 from collections.abc import Mapping, Sequence
+from contextlib import suppress
 from dataclasses import dataclass, replace
 from pathlib import Path
 from typing import Any
@@ -18,7 +19,7 @@ from msgspec import to_builtins
 
 from scripts import engine, pace
 from scripts.benchmark.tracks import Track
-from scripts.comparison.plan import RECORDINGS, Plan, running
+from scripts.comparison.plan import Plan
 from scripts.console import progress
 from scripts.engine import Stage
 from scripts.jobs import Job
@@ -73,15 +74,7 @@ class Task:
 
     def runs(self, slam: str, seeds: Sequence[int]) -> dict[int, Job]:
         """Those of one SLAM in the search, by seed."""
-        plan, job = self.plan((slam,), seeds), running(run, slam, Plan.scan_limit_s)
-        files = {name: made.file_name() for name, made in plan.recordings().items()}
-        return {
-            one.seed: replace(
-                job.over(one.name, {"recording": f"{RECORDINGS}/{files[one.name]}"}),
-                seconds=plan.seconds,
-            )
-            for one in plan.runs()
-        }
+        return {one.seed: job for one, _, job in self.plan((slam,), seeds).entries(run)}
 
     def settings(self) -> dict[str, Any]:
         """For a recipe."""
@@ -211,8 +204,7 @@ def _study(task: Task, first: Trial) -> tuple[Any, dict[str, Any]]:
         sampler = optuna.samplers.TPESampler(seed=SEED, multivariate=True)
     study = optuna.create_study(sampler=sampler)
     varied = {path: one.distribution(optuna.distributions) for path, one in task.space.items()}
-    known = defaults(task.slam, task.space)
-    if len(known) == len(varied) and all(task.space[path].has(v) for path, v in known.items()):
-        made = optuna.trial.create_trial(params=known, distributions=varied, value=first.value)
-        study.add_trial(made)
+    known = {"params": defaults(task.slam, task.space), "distributions": varied}
+    with suppress(ValueError):  # of numbers that lie outside, or do not say what they are
+        study.add_trial(optuna.trial.create_trial(**known, value=first.value))
     return study, varied

@@ -7,6 +7,7 @@ matching.local.points = {low = 60, high = 360, int = true}
 objective = {choices = ["sum", "log"]}
 """
 
+import math
 import re
 import shlex
 from collections.abc import Iterator, Mapping
@@ -42,12 +43,10 @@ class Searched(Table, frozen=True, omit_defaults=True):
     def ends(self) -> tuple[Any, ...]:
         """Both bounds, or all choices; ``InvalidValueError`` for what is neither."""
         low, high = self.low, self.high
-        if self.choices is not None:
-            if (low, high, self.log, self.whole) != (None, None, False, False):
-                raise InvalidValueError("has choices or low and high, not both")
+        if self.choices is not None and self == Searched(choices=self.choices):
             return tuple(self.choices)
-        if low is None or high is None:
-            raise InvalidValueError("needs low and high, or choices")
+        if self.choices is not None or low is None or high is None:
+            raise InvalidValueError("needs low and high, or choices alone")
         if not low < high:
             raise InvalidValueError(f"low must be below high, got {low:g} and {high:g}")
         if self.log and low <= 0.0:
@@ -55,12 +54,6 @@ class Searched(Table, frozen=True, omit_defaults=True):
         if self.whole and (low != int(low) or high != int(high)):
             raise InvalidValueError(f"low and high must be whole with int, got {low:g}, {high:g}")
         return (int(low), int(high)) if self.whole else (low, high)
-
-    def has(self, value: Any) -> bool:
-        """Whether the search could come to that value."""
-        if self.choices is not None:
-            return value in self.choices
-        return bool(self.ends[0] <= value <= self.ends[1])
 
     def distribution(self, of: Any) -> Any:
         """The same for Optuna, whose module ``optuna.distributions`` is ``of``."""
@@ -125,6 +118,8 @@ def _try(slam: str, name: str, one: Searched) -> None:
         ends = one.ends
     except InvalidValueError as error:
         raise InvalidValueError(f"{name}: {error}") from error
+    if one.choices is None and not one.whole:  # between them what no whole number may be
+        ends += (one.rounded(ends[0] + (ends[1] - ends[0]) / math.pi),)
     for value in ends:
         known = system.config_of(variant(slam, {name: value}))
         if known is None and ":" not in inside(slam):

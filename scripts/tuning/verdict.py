@@ -1,13 +1,13 @@
 # SPDX-License-Identifier: Apache-2.0
 """What fresh seeds say of the numbers that the search found: a gain, or none that they confirm."""
 
-from collections.abc import Sequence
+from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Literal
+from typing import Any, Literal
 
 from scripts.comparison.tables import Row, by_seed
-from scripts.report.answer import ODOMETRY
-from slam.evaluation.statistics import paired, quantile, ratio_interval, share_interval
+from scripts.report.answer import ODOMETRY, percent
+from slam.evaluation.statistics import paired, quantile, ratio_interval
 
 LEVEL = 0.025  # of the sign tests: two questions are asked, and both together err in 1 of 20
 ERROR, COST = "ate_unaligned_m", "ms_per_scan_p50"
@@ -18,48 +18,42 @@ class Verdict:
     """Two SLAMs on the same fresh runs.
 
     gain   in which of the two questions the second is better
-    lost   runs lost by each, of ``runs``;  saved, anew  runs that only the first, the second lost
-    held   runs that both held;  error_m  medians in them;  wins  of the second there
-    ratio  of the errors, with its interval;  p_lost, p_error  of the sign tests
+    lost   runs lost by each, of ``runs``
+    of_lost, of_error  the second against the first (``slam.evaluation.statistics.paired``): in what
+           they lose, and in the error of the runs that both held
+    ratio  of the medians of that error, with its interval
     ms     of a scan, medians;  odometry_lost  runs that it loses alone, if it ran
     """
 
     gain: Literal["lost", "error", ""]
     runs: int
     lost: tuple[int, int]
-    saved: int
-    anew: int
-    p_lost: float
-    held: int
-    error_m: tuple[float, float]
+    of_lost: Mapping[str, Any]
+    of_error: Mapping[str, Any]
     ratio: tuple[float, float, float]
-    wins: int
-    p_error: float
     ms: tuple[float, float]
     odometry_lost: int
 
     @property
     def sentence(self) -> str:
         """The result in one line."""
-        before, after = (
-            f"{k} (95 %: {100 * low:.0f} to {100 * high:.0f} %)"
-            for k in self.lost for low, high in (share_interval(k, self.runs),)
-        )  # fmt: skip
+        of_lost, of_error = self.of_lost, self.of_error
+        before, after = (f"{k} (95 %: {percent(k, self.runs)})" for k in self.lost)
         fewer, low, high = (100.0 * (1.0 - one) for one in self.ratio)
         error = (
             f"where both hold the error is {abs(fewer):.0f} % {'lower' if fewer >= 0 else 'higher'}"
             f" (95 %: {min(low, high):.0f} to {max(low, high):.0f} %), "
-            f"lower in {self.wins} of {self.held} (p = {self.p_error:.2g})"
+            f"lower in {of_error['wins']} of {of_error['n']} (p = {of_error['p_sign']:.2g})"
         )
         lost = (
-            f"lost in {after} of {self.runs} fresh runs instead of {before}: {self.saved} saved, "
-            f"{self.anew} lost anew (p = {self.p_lost:.2g})"
+            f"lost in {after} of {self.runs} fresh runs instead of {before}: "
+            f"{of_lost['wins']} saved, {of_lost['losses']} lost anew (p = {of_lost['p_sign']:.2g})"
         )
         if self.gain == "lost":
             return f"{lost[0].upper()}{lost[1:]}."
         if self.gain == "error":
             return f"{error[0].upper()}{error[1:]}; {lost}."
-        tells = 2.0 * 0.5**self.held < LEVEL  # else not even all wins would
+        tells = 2.0 * 0.5 ** of_error["n"] < LEVEL  # else not even all wins would
         return f"No gain that fresh seeds confirm: {lost}" + (f"; {error}." if tells else ".")
 
 
@@ -82,9 +76,7 @@ def judge(rows: Sequence[Row], before: str, after: str) -> Verdict:
         gain = "error" if counts[1] <= counts[0] else ""
     ratio = medians[1] / medians[0] if held and medians[0] > 0.0 else 1.0
     return Verdict(
-        gain=gain, runs=len(seeds), lost=(counts[0], counts[1]), saved=of_lost["wins"],
-        anew=of_lost["losses"], p_lost=of_lost["p_sign"], held=len(held),
-        error_m=(medians[0], medians[1]), ratio=(ratio, *ratio_interval(*errors)),
-        wins=of_error["wins"], p_error=of_error["p_sign"], ms=(ms[0], ms[1]),
+        gain=gain, runs=len(seeds), lost=(counts[0], counts[1]), of_lost=of_lost,
+        of_error=of_error, ratio=(ratio, *ratio_interval(*errors)), ms=(ms[0], ms[1]),
         odometry_lost=int(sum(by_seed(rows, ODOMETRY, "lost").values())),
     )  # fmt: skip

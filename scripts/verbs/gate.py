@@ -12,6 +12,7 @@ from scripts.names import check
 from scripts.options import named
 from scripts.spec import REQUIRED, SLAMS, command_line, names_of, option, part, spec
 from slam.errors import InvalidValueError, MissingPathError, MobiliaError
+from slam.files import replacing
 from slam.set_numbers import with_set
 
 if TYPE_CHECKING:
@@ -61,29 +62,31 @@ class Gate:
             vars(error)["status"] = TROUBLE
             raise
 
-    def _ways(self) -> dict[str, Any]:
+    def _asked(self) -> tuple[str, dict[str, Any]]:
+        """The SLAM with its numbers, and where it runs."""
+        check([self.slam])
         from scripts.workers import check_jobs
 
         check_jobs(self.work.jobs)
-        return {"jobs": self.work.jobs, "cluster": self.work.cluster}
-
-    def _slam(self) -> str:
-        check([self.slam])
-        return with_set((self.slam,), self.set_ or [])[0]
+        ways = {"jobs": self.work.jobs, "cluster": self.work.cluster}
+        return with_set((self.slam,), self.set_ or [])[0], ways
 
     def _save(self) -> None:
         assert self.save is not None
-        slam = self._slam()
+        slam, ways = self._asked()
         from scripts.benchmark import runs_file
         from scripts.gate.make import save
         from scripts.gate.runs import SECONDS, of_tracks
 
+        if self.out.resolve() in self.save.resolve().parents:
+            raise InvalidValueError(f"--save must lie outside --out, {self.out}, got {self.save}")
         given = {name: getattr(self, name) for name in OF_SAVE}
         given["tracks"] = named(self.tracks or []) or None
         given = {name: value for name, value in given.items() if value is not None}
         runs = of_tracks(**given)
-        made = save(runs, slam, given.get("seconds", SECONDS), self.out, **self._ways())
-        runs_file.write(self.save, made)
+        with replacing(self.save) as temporary:  # before the runs: what cannot be written is told
+            made = save(runs, slam, given.get("seconds", SECONDS), self.out, **ways)
+            runs_file.write(temporary, made)
         rows = [row for track in made.runs.values() for _, slams in track.values()
                 for row in slams.values()]  # fmt: skip
         lost = sum(row["lost"] for row in rows)
@@ -96,7 +99,7 @@ class Gate:
         for name in OF_SAVE:
             if getattr(self, name) is not None:
                 raise InvalidValueError(f"--{name} is of --save: {self.against} has its runs")
-        slam = self._slam()
+        slam, ways = self._asked()
         if not self.against.exists():
             line = command_line("gate", slam=self.slam, save=self.against)
             raise MissingPathError(self.against, f"no such file; to make it: {line}")
@@ -104,7 +107,7 @@ class Gate:
         from scripts.gate.make import hold
 
         saved = submission.read(self.against)
-        _tell(hold(self.against, saved, slam, self.out, **self._ways()), self.out)
+        _tell(hold(self.against, saved, slam, self.out, **ways), self.out)
 
 
 def _tell(paired: "Paired", out: Path) -> None:

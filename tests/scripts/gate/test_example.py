@@ -26,10 +26,10 @@ def test_wheels_are_exact(mobilia_stream):
 """
 MARKS = {
     'track="rush-huor"': "no track is called 'rush-huor'. Did you mean 'rush-hour'?",
-    'track="rush-hour", lvel=1': "unexpected keyword argument 'lvel'",
+    'track="rush-hour", lvel=1': "unknown key 'lvel'; known: track, level, seeds, seconds",
     'track="rush-hour", level=0.3': "must be one of 0, 0.25, 0.5, 0.75, 1, got 0.3",
-    'track="rush-hour", seeds="many"': "mobilia(seeds) must be a whole number from 1",
-    "": "missing a required argument: 'track'",
+    'track="rush-hour", seeds="many"': "mobilia.seeds must be a whole number from 1",
+    "": "mobilia.track must be a word, got nothing",
 }
 
 

@@ -13,9 +13,11 @@ from typer.testing import CliRunner
 from scripts.benchmark import runs_file, submission
 from scripts.benchmark.tracks import newest
 from scripts.cli import TYPED, app
+from scripts.gate import make
 from scripts.gate.runs import of_results, of_tracks
 from scripts.gate.told import Paired
 from scripts.verbs.blame import Blame
+from sim.sensors.lidar.registry import scanner_of
 from tests.commands import read_by
 
 pytestmark = pytest.mark.slow
@@ -94,6 +96,7 @@ def test_other_scans_are_refused(saved):
     status, said = gate(f"--slam odometry --against {file} --out {saved.parent / 'out'}")
     assert status == 2
     assert "tour-guide-v1, level 0, seed 0 is of other scans than here" in said
+    assert not [file for file in (saved.parent / "out").iterdir() if file.name in make.TOLD]
 
 
 def test_a_slam_that_fails_in_all_of_the_first_runs_is_told_in_one_line(saved, monkeypatch):
@@ -112,6 +115,8 @@ def test_a_slam_that_fails_in_all_of_the_first_runs_is_told_in_one_line(saved, m
         ("--slam ekf", "name exactly one of --against and --save"),
         ("--slam ekf --save a.json --tracks nowhere", "no track is called 'nowhere'"),
         ("--slam ekf --save a.json --level 0.3", "level of a track must be one of 0, 0.25"),
+        ("--slam ekf --save out/gate/a.json", "--save must lie outside --out, out/gate"),
+        ("--slam ekf --save /proc/a.json", "cannot write /proc/a.json"),
         ("--slam ekf --save a.json --seeds 21", "--seeds must be 1 to 20, got 21"),
         ("--slam ekf --save a.json --set matchin=1", "'matchin'"),
         ("--slam 'oracle(ekf)' --save a.json", "an oracle is a control"),
@@ -138,7 +143,8 @@ def test_the_command_that_shows_a_run_makes_its_very_world(monkeypatch):
         asked = read(one.blame("ekf"))
         assert isinstance(asked, Blame)
         case = asked._simulated()
-        assert {**case.settings, "labels": True} == one.recipe.simulation()
+        laser = scanner_of(case.settings["laser"])
+        assert {**case.settings, "labels": True, "laser": laser} == one.recipe.simulation()
         assert (case.seconds, case.every, case.slam) == (20.0, one.every, "ekf")
 
 

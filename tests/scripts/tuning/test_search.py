@@ -135,6 +135,7 @@ def test_the_score_falls_from_failed_over_lost_to_held(tmp_path: Path, out: Path
         run.run(path, recording=str(recording), slam=slam)
         return float(np.load(path)["score"])
 
+    assert score("shunting{decay_per_s=0.1,lateral_sum=0.9}") == run.FAILED  # not together
     assert run.FAILED == score("nothing:Here") >= score("off") > 1.0 > score("off{off_m=0.2}")
     assert score("off{off_m=0.2}") == pytest.approx(0.2, abs=0.05)
 

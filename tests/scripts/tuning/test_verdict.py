@@ -25,8 +25,8 @@ LOST, HELD = (True, 3.0), (False, 0.1)
 
 def test_runs_saved_are_a_gain_where_the_sign_test_says_so():
     found = verdict([LOST] * 9 + [HELD] * 11, [LOST] * 1 + [HELD] * 19)
-    assert (found.gain, found.lost, found.saved, found.anew) == ("lost", (9, 1), 8, 0)
-    assert found.p_lost == 2 * 0.5**8
+    assert (found.gain, found.lost) == ("lost", (9, 1))
+    assert found.of_lost["p_sign"] == 2 * 0.5**8
     said = "Lost in 1 (95 %: 1 to 24 %) of 20 fresh runs instead of 9 (95 %: 26 to 66 %): 8 saved"
     assert found.sentence.startswith(said)
 
@@ -48,7 +48,7 @@ def test_nothing_held_and_failed_runs_are_judged_too():
     failed = [{"slam": "a", "seed": k, "lost": 1, "ate_unaligned_m": None, "outcome": "raised"}
               for k in range(8)]  # fmt: skip
     found = judge(failed + rows("b", [HELD] * 8), "a", "b")
-    assert (found.gain, found.held) == ("lost", 0)
+    assert (found.gain, found.of_error["n"]) == ("lost", 0)
     few = [*[LOST] * 8, *[HELD] * 6]
     assert verdict(few, few).sentence.endswith("0 saved, 0 lost anew (p = 1).")
     assert "where both hold" in verdict([*few, HELD], [*few, HELD]).sentence
