@@ -37,7 +37,7 @@ REFUSED = "pass --trust"
 # what they are given is ours or typed, or goes through the readers of run --log
 OPEN_NOTHING = {
     "demo", "list", "config", "bench", "doctor", "sensor-card", "live", "twin", "score",
-    "reproduce",
+    "reproduce", "tune",
 }  # fmt: skip
 Words = list[str]
 
@@ -87,6 +87,8 @@ ROWS = [
         lambda h: [str(h.comparison(scene="arena", slam=h.pipe))], REFUSED),
     Row("blame", "comparison: arrays of objects",
         lambda h: [str(h.comparison(scene="arena", slam="odometry"))], "holds objects"),
+    Row("gate", "results: a command as SLAM",
+        lambda h: ["--against", str(h.submission()), "--slam", "odometry"]),
     Row("shrink", "run: a command as SLAM",
         lambda h: [str(h.run(scene="arena", slam=h.pipe))], REFUSED),
     Row("run", "run made again: a module as scene",

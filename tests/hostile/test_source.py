@@ -29,7 +29,7 @@ IMPORTERS = {
     "slam/__init__.py": "public names, by constants",
     "scenes/__init__.py": "the same",
     "sim/sensors/lidar/registry.py": "scanner models of ours, by their files",
-    "slam/guests/guest.py": "the two guests, by constants",
+    "slam/errors.py": "packages of extras, by constants",
     "sim/gym/offline.py": "Minari, by constants",
     "sim/view/camera.py": "the GL libraries, by constants",
     "scripts/workers.py": "Dask",

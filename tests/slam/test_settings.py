@@ -109,7 +109,7 @@ def test_the_digest_changes_with_every_number_that_can_be_set(name: str) -> None
 @pytest.mark.parametrize("name", CONFIGURABLE)
 def test_every_number_has_unit_meaning_source_and_bounds(name: str) -> None:
     rows = list(default_of(name).rows())
-    assert len(rows) > 10
+    assert len(rows) > 4
     assert sum(row.about.fixed for row in rows) <= 6  # the way out for compiled kernels
     for row in rows:
         about = row.about
@@ -128,7 +128,8 @@ def test_every_number_is_read_where_something_is_computed() -> None:
     read |= set(re.findall(r"self\.([a-z_0-9]+)\b", (ROOT / "frontend/config.py").read_text()))
     read |= set(re.findall(r"self\.([a-z_0-9]+)\b", (ROOT / "ekf/config.py").read_text()))
     read |= {"damping_falls", "damping_grows", "damping_least", "damping_again", "damping_most"}
-    for name in CONFIGURABLE:
+    ours = [name for name in CONFIGURABLE if ".guests." not in slam.system.OWN[name]]
+    for name in ours:  # a guest's go to its package, by their names
         for row in default_of(name).rows():
             assert row.path.rpartition(".")[2] in read, row.path
 

@@ -177,8 +177,8 @@ def test_links_and_other_ways_to_say_it_are_the_same_file(tmp_path: Path):
 
 def test_every_path_of_a_verb_is_read_or_written():
     """A new one is to be put here, or ``writes=True``."""
-    read = {"data", "bag", "episode", "events", "folder", "log", "map_in", "map_yaml",
-            "merge", "on", "scene", "text_format"}  # fmt: skip
+    read = {"against", "data", "bag", "episode", "events", "folder", "log", "map_in", "map_yaml",
+            "merge", "on", "recipe", "scene", "space", "text_format"}  # fmt: skip
     paths = [
         one
         for command in (*app.registered_commands, *scene.registered_commands)
@@ -187,6 +187,6 @@ def test_every_path_of_a_verb_is_read_or_written():
     ]
     assert {one.name for one in paths if not one.writes} == read
     assert {one.name for one in paths if one.writes} == {
-        "out", "strip_to", "replay", "page", "map_out"
+        "out", "strip_to", "replay", "page", "map_out", "save"
     }  # fmt: skip
     assert all(issubclass(one.cls, Verb) for one in app.registered_commands)
