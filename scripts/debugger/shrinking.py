@@ -128,24 +128,31 @@ class Shrinking:
 
     def _with_few(self, whole: Part) -> Part:
         """A short part with as few movers as can be."""
-        first: list[Part] = []
-        more: list[Part] = []  # not small: longer, or holders came with who they hold
-        for begins, rung in product(BEGINS, LADDER):
-            windows = self._windows(whole, begins, *rung)
-            first = first or windows
-            for part, names in self._tries(windows):
-                if end := self.lost(replace(part, keep=names)):
-                    more.append(self._later(self._minimal(end)))
-                    if self._is_small(more[-1]):
-                        return more[-1]
-        if more:
-            return min(more, key=lambda part: len(part.keep or ()))
-        part = self._thin((first or [whole])[0])
-        end = self.lost(replace(part, keep=self._likeliest(part, len(self.tape.names))))
-        return self._minimal(end) if end else part
+        found: list[Part] = []
+        for part, names in self._candidates(whole, found):
+            if end := self.lost(replace(part, keep=names)):
+                found.append(self._later(self._minimal(end)))
+                movers, scans = len(found[-1].keep or ()), found[-1].scans
+                if movers <= FEW and scans * self.period_s <= SHORT_S:
+                    return found[-1]
+        if found:
+            return min(found, key=lambda part: len(part.keep or ()))
+        return self._thin((self._windows(whole, BEGINS[0], *LADDER[-1]) or [whole])[0])
 
-    def _is_small(self, part: Part) -> bool:
-        return part.scans * self.period_s <= SHORT_S and len(part.keep or ()) <= FEW
+    def _candidates(
+        self, whole: Part, found: Sequence[Part]
+    ) -> Iterator[tuple[Part, tuple[str, ...]]]:
+        """Parts, and which movers stay in them: few, and all that is seen where ``found`` is empty
+        after those."""
+        for begins in BEGINS:
+            first: list[Part] = []
+            for rung in LADDER:
+                windows = self._windows(whole, begins, *rung)
+                first = first or windows
+                yield from self._tries(windows)
+            if first and not found:
+                part = self._thin(first[0])
+                yield part, self._likeliest(part, len(self.tape.names))
 
     def _windows(
         self, whole: Part, begins: int, seconds: float, every: int, beams: int
@@ -176,7 +183,7 @@ class Shrinking:
             yield from ((part, self._likeliest(part, count)) for count, part in pairs)
 
     def _likeliest(self, part: Part, count: int) -> tuple[str, ...]:
-        """So many of the movers seen in it, and who holds them: else they go out with that one."""
+        """So many of the movers seen in it, and who holds them: else they stand."""
         names = [one.name for one in sightings(self.tape, part.first, part.last - 1)][:count]
         holders = [hold.holder for hold in self.tape.holds if hold.held in names]
         return tuple(dict.fromkeys([*names, *holders]))

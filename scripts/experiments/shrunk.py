@@ -19,12 +19,12 @@ from scripts.comparison.again import again_of
 from scripts.console import ended
 from scripts.debugger.recording import Case
 from scripts.debugger.shrinking import FEW, SHORT_S
-from scripts.debugger.shrunk import shrunk
+from scripts.debugger.shrunk import carry_out
 from scripts.engine import Stage, make
 from scripts.jobs import Job
 from scripts.marks import check_page, fill_page, table
 from scripts.names import file_name
-from scripts.output import RECIPE, write_recipe
+from scripts.output import RECIPE
 from scripts.result_files import RESULTS
 from slam.files import write_text
 
@@ -50,11 +50,11 @@ def shrink(path: Path, *, slam: str, track: str, seed: int) -> None:
     of = TRACKS[track]
     plan = of.plan((slam,), (seed,), levels=(LEVEL,), oracles=False)
     found, started = again_of(plan.recipe(plan.runs()[0])), time.perf_counter()
-    made = shrunk(Case(settings=found.settings, seconds=found.seconds, slam=slam, every=of.every))
-    wall_s = time.perf_counter() - started
+    case = Case(settings=found.settings, seconds=found.seconds, slam=slam, every=of.every)
     with tempfile.TemporaryDirectory() as folder:
-        write_recipe(Path(folder), "shrink", {"slams": [slam], **made.world})
-        size = (Path(folder) / RECIPE).stat().st_size
+        made = carry_out(case, Path(folder) / MARK, overwrite=False, filmed=False)
+        size = (Path(folder) / MARK / RECIPE).stat().st_size
+    wall_s = time.perf_counter() - started
     row: dict[str, Any] = {"SLAM": slam, "track": track, "seed": seed}
     for word, (before, left) in made.sizes.items():
         row |= {word: before, f"{word} left": left}
