@@ -125,7 +125,14 @@ def _check_settings(path: Path, settings: Mapping[str, Any]) -> None:
 
 
 def _cut(settings: Mapping[str, Any]) -> Cut:
-    cut: Cut = shaped("cut", settings.get("cut", {}), Cut)
+    given, known = settings.get("cut", {}), [field.name for field in fields(Cut)]
+    cut: Cut = shaped("cut", given, Cut)
+    if unknown := sorted(set(given) - set(known)):
+        raise InvalidValueError(f"cut has {', '.join(known)}, but no {unknown[0]!r:.80}")
+    if not cut.from_s < settings["seconds"]:
+        raise InvalidValueError(
+            f"cut.from_s must be < {settings['seconds']:g} s, its run's end, got {cut.from_s:g}"
+        )
     return cut
 
 

@@ -5,10 +5,9 @@ A part begins at some scan: the SLAM starts there, at the true pose, without a m
 running it. Seconds come first, then movers and events, at last scans and beams.
 """
 
-import hashlib
 from collections.abc import Callable, Iterable, Iterator, Sequence
 from dataclasses import dataclass, replace
-from itertools import islice, pairwise
+from itertools import islice, pairwise, product
 from typing import Any, TypeVar
 
 import numpy as np
@@ -25,7 +24,8 @@ from slam.replay import Track
 from slam.system import create
 
 SHORT_S = 10.0  # s that any part may take to be lost
-BEGIN_S, BEGINS = 2.0, 12  # s from one beginning that is tried to the next; so many, by the loss
+BEGIN_S = 2.0  # s from one beginning that is tried to the next
+BEGINS = 12, 100_000  # so many, by the loss; where no small part is found, those of the whole run
 # s of parts that are looked for, one scan in so many of what the SLAM got, and one beam in so many;
 # the next where few movers do not lose it.
 LADDER = (
@@ -37,7 +37,7 @@ FEW = 3  # movers that are tried alone before others are taken out by halves
 THINNED = 2  # parts of which first the scans and beams are, where no few movers will do
 LONGEST_STEP = 16  # states of the tape, half a second each
 LEAST_BEAMS, BATCH = 16, 10  # beams; scans from one look at the loss to the next
-MOST_S = 1200.0  # s that are simulated again in all; then the smallest so far is it
+MOST_S = 2400.0  # s that are simulated again in all; then the smallest so far is it
 T = TypeVar("T")
 
 
@@ -128,53 +128,62 @@ class Shrinking:
 
     def _with_few(self, whole: Part) -> Part:
         """A short part with as few movers as can be."""
-        first: list[Part] = []
-        more: list[Part] = []  # with more than a few movers: holders came with who they hold
-        for rung in LADDER:
-            windows = self._windows(whole, *rung)
-            first = first or windows
-            for part, count in self._tries(windows):
-                end = self.lost(replace(part, keep=self._likeliest(part, count)))
-                more += [self._minimal(end)] if end else []
-                if end and len(more[-1].keep or ()) <= FEW:
-                    return more[-1]
-        if more:
-            return min(more, key=lambda part: len(part.keep or ()))
-        part = self._thin((first or [whole])[0])
-        kinds = zip(self.tape.names, self.tape.kinds, strict=True)
-        everybody = [name for name, kind in kinds if kind != "robot"]
-        for keep in (self._likeliest(part, len(everybody)), tuple(everybody)):
-            if end := self.lost(replace(part, keep=keep)):
-                return self._minimal(end)
-        return part
+        found: list[Part] = []
+        for part, names in self._candidates(whole, found):
+            if end := self.lost(replace(part, keep=names)):
+                found.append(self._later(self._minimal(end)))
+                movers, scans = len(found[-1].keep or ()), found[-1].scans
+                if movers <= FEW and scans * self.period_s <= SHORT_S:
+                    return found[-1]
+        if found:
+            return min(found, key=lambda part: len(part.keep or ()))
+        return self._thin((self._windows(whole, BEGINS[0], *LADDER[-1]) or [whole])[0])
 
-    def _windows(self, whole: Part, seconds: float, every: int, beams: int) -> list[Part]:
-        """The shortest parts with everybody, the best first.
+    def _candidates(
+        self, whole: Part, found: Sequence[Part]
+    ) -> Iterator[tuple[Part, tuple[str, ...]]]:
+        """Parts, and which movers stay in them: few, and all that is seen where ``found`` is empty
+        after those."""
+        for begins in BEGINS:
+            first: list[Part] = []
+            for rung in LADDER:
+                windows = self._windows(whole, begins, *rung)
+                first = first or windows
+                yield from self._tries(windows)
+            if first and not found:
+                part = self._thin(first[0])
+                yield part, self._likeliest(part, len(self.tape.names))
+
+    def _windows(
+        self, whole: Part, begins: int, seconds: float, every: int, beams: int
+    ) -> list[Part]:
+        """The shortest parts with everybody, the best first; of the whole run one a loss.
 
         Where scans and beams are left out they must not be lost with nobody, as in ``_thin``.
         """
-        step, middle = round(BEGIN_S / self.period_s), whole.last - round(SHORT_S / self.period_s)
+        step, short = round(BEGIN_S / self.period_s), round(SHORT_S / self.period_s)
         rows = {row // step: row for row in sorted(self.tape.states, reverse=True)}.values()
-        begins = sorted(rows, key=lambda row: abs(row - middle))[:BEGINS]
-        like, length = (
-            replace(whole, every=every * whole.every, beams=beams),
-            seconds / self.period_s,
-        )
-        ends = [self.lost(replace(like, first=k, last=k + round(length))) for k in begins]
+        near = sorted(rows, key=lambda row: abs(row - whole.last + short))[:begins]
+        like = replace(whole, every=every * whole.every, beams=beams)
+        length = round(seconds / self.period_s)
+        ends = [self.lost(replace(like, first=row, last=row + length)) for row in near]
         found = sorted(filter(None, ends), key=lambda part: (part.scans, part.first))
+        if begins > BEGINS[0]:
+            losses = {part.last // step: part for part in reversed(found)}
+            found = sorted(losses.values(), key=lambda part: (part.scans, part.first))
         if every > 1 or beams > 1:
             found = [part for part in found if not self.lost(replace(part, keep=()))]
         return found[:SHORTEST]
 
-    def _tries(self, windows: Sequence[Part]) -> Iterator[tuple[Part, int]]:
-        """Parts, and how many movers stay in them; then thin ones."""
+    def _tries(self, windows: Sequence[Part]) -> Iterator[tuple[Part, tuple[str, ...]]]:
+        """Parts, and which movers stay in them; then thin ones."""
         thin = (self._thin(part) for part in windows[:THINNED])
         for parts in (windows, thin):
-            same = list(parts)
-            yield from ((part, count) for count in range(FEW + 1) for part in same)
+            pairs = product(range(FEW + 1), list(parts))
+            yield from ((part, self._likeliest(part, count)) for count, part in pairs)
 
     def _likeliest(self, part: Part, count: int) -> tuple[str, ...]:
-        """So many of the movers seen in it, and who holds them: else they go out with that one."""
+        """So many of the movers seen in it, and who holds them: else they stand."""
         names = [one.name for one in sightings(self.tape, part.first, part.last - 1)][:count]
         holders = [hold.holder for hold in self.tape.holds if hold.held in names]
         return tuple(dict.fromkeys([*names, *holders]))
@@ -216,8 +225,8 @@ class Shrinking:
     def _without_events(self, part: Part) -> Part:
         """Without those events, and without that carrying, that need not be."""
         case, kinds = self.case, ("events", "kidnap_every_s")
-        given = [(kind, case.settings.get(kind)) for kind in kinds]
-        what = [(kind, row) for kind, rows in given for row in _as_list(rows)]
+        what = [("events", row) for row in case.settings.get("events") or ()]
+        what += [(kind, case.settings[kind]) for kind in kinds[1:] if case.settings.get(kind)]
 
         def still(kept: Sequence[tuple[str, Any]]) -> Part | None:
             own = {key: value for key, value in case.settings.items() if key not in kinds}
@@ -230,10 +239,6 @@ class Shrinking:
                 return None
 
         return (still(minimal(what, still)) or part) if what else part
-
-
-def _as_list(value: Any) -> list[Any]:
-    return value if isinstance(value, list) else [] if value is None else [value]
 
 
 def lost_row(slam: str, frames: Iterable[Frame]) -> int | None:
@@ -262,18 +267,6 @@ def not_lost(slam: str, frames: Sequence[Frame]) -> MobiliaError:
         f"SLAM '{slam}' is not lost in this run, so there is nothing to shrink: it is {off:.2f} m "
         f"off at most (lost: {LOST_RULE})"
     )
-
-
-def digest(frames: Iterable[Frame]) -> str:
-    """SHA-256 of what a SLAM gets, and of the truth."""
-    whole = hashlib.sha256()
-    for frame in frames:
-        scan, odometry = frame.scan, frame.odometry
-        assert scan is not None
-        arrays = (scan.ranges, odometry.T_odom_robot, odometry.increment_covariance, frame.truth)
-        whole.update(f"{frame.stamp_ns}".encode())
-        whole.update(b"".join(b"" if one is None else one.tobytes() for one in arrays))
-    return whole.hexdigest()
 
 
 def minimal(items: Sequence[T], holds: Callable[[Sequence[T]], object]) -> list[T]:

@@ -2,9 +2,8 @@
 """What is left of a lost run: its recipe, replayed once more for the film, and the folder of it."""
 
 import json
-from collections.abc import Sequence
-from contextlib import ExitStack
-from dataclasses import asdict, dataclass
+from collections.abc import Iterable
+from dataclasses import asdict, dataclass, replace
 from pathlib import Path
 from typing import Any
 
@@ -14,13 +13,12 @@ from rich.table import Table
 from scripts import figures, interrupt
 from scripts.console import progress
 from scripts.debugger.recording import Case
-from scripts.debugger.shrinking import MOST_S, Part, Shrinking, digest, lost_row
-from scripts.film.encode import film, require_ffmpeg
+from scripts.debugger.shrinking import MOST_S, Part, Shrinking, lost_row
+from scripts.film.encode import require_ffmpeg
 from scripts.film.footage import of_scene
-from scripts.film.render import shoot, watched
-from scripts.live.replay import Recorder
-from scripts.metrics.judged import in_first_frame, world_truth
+from scripts.metrics.judged import in_first_frame
 from scripts.output import RECIPE, write_recipe
+from scripts.single_run.session import Outputs, play
 from scripts.whole_folder import whole_folder
 from sim.twins.cut import Cut
 from slam.errors import MobiliaError, SlamFailedError
@@ -35,7 +33,6 @@ class Shrunk:
     world   settings of its recipe but for the SLAM: scene, seconds, ``cut`` and so on
     sizes   (before, left) of seconds, movers, events, scans, beams
     tries   parts that were run;   stopped  after ``MOST_S``
-    sha256  ``digest`` of what the SLAM gets
     """
 
     slam: str
@@ -43,17 +40,6 @@ class Shrunk:
     sizes: dict[str, tuple[float, float]]
     tries: int
     stopped: bool
-    sha256: str
-
-    def check(self, frames: Sequence[Frame]) -> None:
-        """That these are the frames of the last try, and that its SLAM is lost in them again.
-
-        Raises ``MobiliaError``, ``SlamFailedError``.
-        """
-        if digest(frames) != self.sha256:
-            raise MobiliaError("the recipe, replayed, does not give the scans of the last try")
-        if lost_row(self.slam, frames) is None:
-            raise SlamFailedError(f"SLAM '{self.slam}' does not repeat itself on the same frames")
 
     def said(self, folder: Path, wall_s: float) -> list[str]:
         """The result in sentences."""
@@ -78,7 +64,11 @@ class Shrunk:
 
 
 def shrunk(case: Case) -> Shrunk:
-    """The smallest part of a run that is found; raises as ``Shrinking.smallest``."""
+    """The smallest part of a run that is found.
+
+    Raises as ``Shrinking.smallest``, and ``MobiliaError`` and ``SlamFailedError`` where its recipe,
+    made again, does not give the frames of the last try or the SLAM is not lost in them again.
+    """
     with progress() as bar:
         task = bar.add_task("driving", total=None, unit="")
 
@@ -92,12 +82,21 @@ def shrunk(case: Case) -> Shrunk:
     from_s, to_s = (round(scan * search.period_s, 3) for scan in (part.first, part.last))
     cut = Cut(from_s=from_s, keep=part.keep, every=part.every, beams=part.beams)
     left = _sizes(search, part)
+    world = {**search.case.settings, "seconds": to_s, "cut": asdict(cut)}
+    with of_scene(world, view=None) as footage:
+        again = list(footage.stream)
+    if _told(again) != _told(search.frames(part)):
+        raise MobiliaError("the recipe, replayed, does not give the scans of the last try")
+    if lost_row(case.slam, again) is None:
+        raise SlamFailedError(f"SLAM '{case.slam}' does not repeat itself on the same frames")
     return Shrunk(
-        slam=case.slam, world={**search.case.settings, "seconds": to_s, "cut": asdict(cut)},
+        slam=case.slam, world=world, tries=len(search.tried), stopped=search.spent_s > MOST_S,
         sizes={word: (size, left[word]) for word, size in before.items()},
-        tries=len(search.tried), stopped=search.spent_s > MOST_S,
-        sha256=digest(search.frames(part)),
     )  # fmt: skip
+
+
+def _told(frames: Iterable[Frame]) -> list[Frame]:
+    return [replace(frame, labels=None) for frame in frames]
 
 
 def _sizes(search: Shrinking, part: Part) -> dict[str, float]:
@@ -129,19 +128,13 @@ def carry_out(case: Case, folder: Path, *, overwrite: bool, filmed: bool) -> Shr
 
 def _replay(folder: Path, found: Shrunk, filmed: bool) -> None:
     """Film and errors of the recipe, made again from the start."""
-    frames: list[Frame] = []
-    with ExitStack() as stack:
-        footage = stack.enter_context(of_scene(found.world, view="follow" if filmed else None))
-        show, reel, recorder = footage.show([found.slam]), None, None
-        if filmed:
-            reel = stack.enter_context(film(folder / "film.mp4", show.pace.fps))
-            recorder = stack.enter_context(Recorder.of(folder / "replay.html", show))
-        for frame in watched(shoot(footage.stream, show, reel), footage.stream, footage.title):
-            frames.append(frame)
-            if recorder is not None and show.shown is not None:
-                recorder.note(show.shown)
-        if reel is not None and reel.last is not None:
-            imageio.imwrite(folder / "poster.png", reel.last)
-    found.check(frames)
-    tracks = {name: track.online() for name, track in show.replay.tracks.items()}
-    figures.errors(folder / "errors.png", tracks, in_first_frame(world_truth(frames)))
+    with of_scene(found.world, view="follow" if filmed else None) as footage:
+        show = footage.show([found.slam])
+        outputs = Outputs(folder=folder, command="shrink", film=filmed)
+        picture = play(folder, footage.stream, show, outputs).last
+    if picture is not None:
+        imageio.imwrite(folder / "poster.png", picture)
+    truth, tracks = show.replay.truth(), show.replay.tracks
+    assert truth is not None
+    online = {name: track.online() for name, track in tracks.items()}
+    figures.errors(folder / "errors.png", online, in_first_frame(truth))

@@ -12,34 +12,28 @@ import tempfile
 import time
 from collections.abc import Mapping, Sequence
 from pathlib import Path
-from statistics import median
 from typing import Any
 
 from scripts.benchmark.tracks import TRACKS
 from scripts.comparison.again import again_of
 from scripts.console import ended
 from scripts.debugger.recording import Case
-from scripts.debugger.shrunk import shrunk
+from scripts.debugger.shrinking import FEW, SHORT_S
+from scripts.debugger.shrunk import carry_out
 from scripts.engine import Stage, make
-from scripts.film.footage import of_scene
 from scripts.jobs import Job
 from scripts.marks import check_page, fill_page, table
 from scripts.names import file_name
-from scripts.output import RECIPE, write_recipe
+from scripts.output import RECIPE
 from scripts.result_files import RESULTS
 from slam.files import write_text
 
 SLAMS = ("shunting", "occupancy", "ekf", "karto", "kiss-icp")
-LEVEL, MARK = 1.0, "shrink"
-MOST_S, MOST, MOST_BYTES = 10.0, 3, 1024  # s, movers and recipe of what counts as small
-COLUMNS = {
-    "seconds_before": "s", "seconds_left": "s left", "movers_before": "movers",
-    "movers_left": "movers left", "scans_left": "scans left", "beams_left": "beams left",
-    "recipe_bytes": "recipe, bytes", "tries": "parts tried", "wall_s": "wall, s",
-}  # fmt: skip
+LEVEL, N_TRACKS, MARK = 1.0, 4, "shrink"  # tracks of each SLAM
+MOST_BYTES = 1024  # of a recipe that counts as small
 
 
-def chosen(slams: Sequence[str], tracks: int) -> list[tuple[str, str, int]]:
+def chosen() -> list[tuple[str, str, int]]:
     """SLAM, track and seed of the lost runs, each SLAM's first track first."""
     with (RESULTS / "benchmark.csv").open(encoding="utf-8") as file:
         rows = [row for row in csv.DictReader(file) if float(row["level"]) == LEVEL]
@@ -47,8 +41,8 @@ def chosen(slams: Sequence[str], tracks: int) -> list[tuple[str, str, int]]:
     for row in rows:
         if row["lost"] == "1":
             first.setdefault((row["SLAM"], row["track"]), int(row["seed"]))
-    of_each = [[(s, t, n) for (s, t), n in first.items() if s == slam] for slam in slams]
-    return [own[k] for k in range(tracks) for own in of_each if k < len(own)]
+    of_each = [[(s, t, n) for (s, t), n in first.items() if s == slam] for slam in SLAMS]
+    return [own[k] for k in range(N_TRACKS) for own in of_each if k < len(own)]
 
 
 def shrink(path: Path, *, slam: str, track: str, seed: int) -> None:
@@ -56,36 +50,27 @@ def shrink(path: Path, *, slam: str, track: str, seed: int) -> None:
     of = TRACKS[track]
     plan = of.plan((slam,), (seed,), levels=(LEVEL,), oracles=False)
     found, started = again_of(plan.recipe(plan.runs()[0])), time.perf_counter()
-    made = shrunk(Case(settings=found.settings, seconds=found.seconds, slam=slam, every=of.every))
-    wall_s = time.perf_counter() - started
-    with of_scene(made.world, view=None) as footage:
-        made.check(list(footage.stream))  # raises where it is not lost again
+    case = Case(settings=found.settings, seconds=found.seconds, slam=slam, every=of.every)
     with tempfile.TemporaryDirectory() as folder:
-        write_recipe(Path(folder), "shrink", {"slams": [slam], **made.world})
-        size = (Path(folder) / RECIPE).stat().st_size
-    row: dict[str, Any] = {"slam": slam, "track": track, "seed": seed}
+        made = carry_out(case, Path(folder) / MARK, overwrite=False, filmed=False)
+        size = (Path(folder) / MARK / RECIPE).stat().st_size
+    wall_s = time.perf_counter() - started
+    row: dict[str, Any] = {"SLAM": slam, "track": track, "seed": seed}
     for word, (before, left) in made.sizes.items():
-        row |= {f"{word}_before": before, f"{word}_left": left}
+        row |= {word: before, f"{word} left": left}
     keep = made.world["cut"]["keep"]
-    row |= {"left": "all" if keep is None else " ".join(keep), "recipe_bytes": size}
-    write_text(path, json.dumps({**row, "tries": made.tries, "wall_s": round(wall_s)}))
+    row |= {"recipe, bytes": size, "parts tried": made.tries, "wall, s": round(wall_s)}
+    write_text(path, json.dumps({**row, "left": "all" if keep is None else " ".join(keep)}))
 
 
 def told(rows: Sequence[Mapping[str, Any]]) -> str:
-    """What came out in a sentence, and a table of all runs and of each SLAM's medians."""
-    small = [row for row in rows if row["seconds_left"] <= MOST_S and row["movers_left"] <= MOST]
-    light = sum(row["recipe_bytes"] <= MOST_BYTES for row in rows)
-    heads = ["SLAM", "track", "seed", *COLUMNS.values(), "left"]
-    keys = ("slam", "track", "seed", *COLUMNS, "left")
-    cells = [[str(row[key]) for key in keys] for row in rows]
-    for slam in dict.fromkeys(row["slam"] for row in rows):
-        own = [row for row in rows if row["slam"] == slam]
-        middle = [f"{median(row[key] for row in own):g}" for key in COLUMNS]
-        cells.append([f"all of {slam}, median", "", str(len(own)), *middle, ""])
+    """What came out in a sentence, and a table of all runs."""
+    small = [row for row in rows if row["seconds left"] <= SHORT_S and row["movers left"] <= FEW]
+    light = sum(row["recipe, bytes"] <= MOST_BYTES for row in rows)
     return (
-        f"{len(small)} of {len(rows)} became at most {MOST_S:g} s with at most {MOST} movers, "
+        f"{len(small)} of {len(rows)} became at most {SHORT_S:g} s with at most {FEW} movers, "
         f"and {light} recipes have at most 1 kB. Each was replayed, and lost again."
-        f"\n\n{table(heads, cells)}"
+        f"\n\n{table(list(rows[0]), [[str(cell) for cell in row.values()] for row in rows])}"
     )
 
 
@@ -93,8 +78,6 @@ def told(rows: Sequence[Mapping[str, Any]]) -> str:
 def main(arguments: Sequence[str] | None = None) -> None:
     """The command."""
     parser = argparse.ArgumentParser(description=(__doc__ or "").partition("\n")[0])
-    parser.add_argument("--slam", nargs="+", default=list(SLAMS))
-    parser.add_argument("--tracks", type=int, default=4, help="of each SLAM")
     parser.add_argument("--out", type=Path, default=Path("out/shrunk"), help="finished runs")
     parser.add_argument("--page", type=Path, default=RESULTS.parent / f"{MARK}.md")
     parser.add_argument("--jobs", type=int, default=1, help="processes")
@@ -105,7 +88,7 @@ def main(arguments: Sequence[str] | None = None) -> None:
             name=f"{file_name(slam)}_{track}_{seed}", call=shrink, suffix=".json",
             arguments={"slam": slam, "track": track, "seed": seed},
         )
-        for slam, track, seed in chosen(given.slam, given.tracks)
+        for slam, track, seed in chosen()
     ]  # fmt: skip
     files = make([Stage(title="shrinking", folder="runs", jobs=jobs)], given.out, jobs=given.jobs)
     rows = [json.loads(file.read_text(encoding="utf-8")) for file in files.values()]

@@ -146,7 +146,7 @@ def run_session(stream: Stream, show: Show, outputs: Outputs) -> dict[str, Any]:
         outputs.folder, overwrite=outputs.overwrite, command=outputs.command, settings=settings
     ) as folder:
         started = time.perf_counter()
-        played = _play(folder, stream, show, outputs)
+        played = play(folder, stream, show, outputs)
         wall_s = time.perf_counter() - started
         with working("closing loops, scoring"):
             results = score.results(show.replay, wall_s, machine(), played.kept)
@@ -189,7 +189,7 @@ class Played:
     liveliest: Picture | None = None
 
 
-def _play(folder: Path, stream: Stream, show: Show, outputs: Outputs) -> Played:
+def play(folder: Path, stream: Stream, show: Show, outputs: Outputs) -> Played:
     """Run through the stream; film and record it where that is wanted."""
     show.pace = pace = outputs.pace or Pace.within_a_minute(show.duration_s, outputs.film_fps)
     kept, liveliest = KeptScans(), Liveliest(show.duration_s / 3.0)

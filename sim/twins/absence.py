@@ -60,16 +60,17 @@ class Change:
         return ", ".join(words) or "as it was"
 
 
-def apply(simulation: Simulation, change: Change) -> None:
+def apply(simulation: Simulation, change: Change, *, held: bool = True) -> None:
     """Take movers out of a simulation, or freeze them, from its present state on.
 
-    Once for a simulation, after ``load_state``. Raises ``UnknownNameError`` for a name that no
+    Once for a simulation, after ``load_state``. ``held``: what they hold goes out, too; else it
+    stands where it was let go. Raises ``UnknownNameError`` for a name that no
     mover has and ``InvalidValueError`` for the robot.
     """
     world = simulation.world
     for name in (*change.out, *change.frozen):
         _check(world, name)
-    out = with_held(world.scene.holds, change.out)
+    out = with_held(world.scene.holds, change.out) if held else change.out
     for name in out:
         _hide(world, name)
     if out:

@@ -81,15 +81,15 @@ WHOLE = Cut()
 def begin(simulation: Simulation, state: bytes, keep: tuple[str, ...]) -> None:
     """Go on from the state of another simulation made alike, with only these movers.
 
-    What somebody holds who is not kept goes out, too. Raises ``UnknownNameError`` for a name that
-    no mover has.
+    What is kept without who holds it stands where it was let go. Raises ``UnknownNameError`` for a
+    name that no mover has.
     """
     movers = simulation.world.scene.movers
     for name in set(keep) - {mover.name for mover in movers}:
         raise UnknownNameError(f"no mover is called '{name}', which is to be kept")
     simulation.load_state(state)
     out = [m.name for m in movers if m.group != "robot" and m.name not in keep]
-    absence.apply(simulation, Change(out=tuple(out)))
+    absence.apply(simulation, Change(out=tuple(out)), held=False)
 
 
 class Thin:

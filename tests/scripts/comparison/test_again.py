@@ -98,6 +98,10 @@ def test_what_is_no_run_is_told_in_a_line(run, tmp_path):
          "no recipe of a run: seconds must be a number"),
         ('{"world": 2, "settings": {"scene": "arena", "slams": [7]}}',
          "slams must be a list of names, got [7]"),
+        ('{"world": 2, "settings": {"scene": "arena", "seconds": 2, "cut": {"from_s": 5}}}',
+         "cut.from_s must be < 2 s, its run's end, got 5"),
+        ('{"world": 2, "settings": {"scene": "arena", "seconds": 2, "cut": {"from": 1}}}',
+         "cut has from_s, keep, every, beams, but no 'from'"),
     ],
 )  # fmt: skip
 def test_a_recipe_that_cannot_be_one_is_told_in_a_line(tmp_path: Path, text: str, says: str):

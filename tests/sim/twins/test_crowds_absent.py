@@ -109,6 +109,18 @@ def test_what_is_parked_stays_parked_and_is_met_by_no_ray(before, name, gone):
     assert all(pose(simulation, each)[0] < world.scene.bounds[2] for each in others)
 
 
+@pytest.mark.parametrize(
+    ("name", "let_go"), [("board_pusher0", "board0"), ("train_puller0", "wagon0")]
+)
+def test_what_is_let_go_stands_where_it_is(before, name, let_go):
+    simulation = Simulation(**ROOM)
+    simulation.load_state(before[0])
+    apply(simulation, Change(out=(name,)), held=False)
+    drive(simulation, 40)
+    assert pose(simulation, name)[0] > simulation.world.scene.bounds[2] + 10.0
+    assert way(simulation, before, let_go) < 0.2
+
+
 def test_who_follows_a_leader_that_is_out_stands_and_one_that_is_not_goes_on(before):
     simulation = changed(before, Change(out=("group0",)))
     names = ("group1", "group2", "group3")
