@@ -142,17 +142,20 @@ class Shrinking:
     def _candidates(
         self, whole: Part, found: Sequence[Part]
     ) -> Iterator[tuple[Part, tuple[str, ...]]]:
-        """Parts, and which movers stay in them: few, and all that is seen where ``found`` is empty
-        after those."""
+        """Parts, and which movers stay in them: few; where ``found`` is empty after those all that
+        is seen, then all."""
         for begins in BEGINS:
             first: list[Part] = []
             for rung in LADDER:
                 windows = self._windows(whole, begins, *rung)
                 first = first or windows
                 yield from self._tries(windows)
-            if first and not found:
-                part = self._thin(first[0])
+            part = self._thin((first or [whole])[0])
+            if not found:
                 yield part, self._likeliest(part, len(self.tape.names))
+            if not found:
+                kinds = zip(self.tape.names, self.tape.kinds, strict=True)
+                yield part, tuple(name for name, kind in kinds if kind != "robot")
 
     def _windows(
         self, whole: Part, begins: int, seconds: float, every: int, beams: int
